@@ -1,0 +1,106 @@
+"""One side of a conversion: a distribution and the encoding of its parameter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mdfconv.distributions import Distribution, distribution
+from mdfconv.distributions.evaluation import Array
+from mdfconv.distributions.gtr import GTR
+from mdfconv.distributions.parameter import Encoding, Parameter
+from mdfconv.errors import MdfconvError, unknown_name
+
+DEFAULT_ENCODING = "alpha"
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """A distribution and, where the value is stored in another form, its encoding.
+
+    Parameters
+    ----------
+    distribution : Distribution
+        The distribution; for GTR with its γ.
+    encoding : Encoding or None
+        The stored form; None for the parameter itself.
+    """
+
+    distribution: Distribution
+    encoding: Encoding | None = None
+
+    @property
+    def label(self) -> str:
+        """The name as the user may write it, such as ``"ggx:roughness"``."""
+        suffix = f":{self.encoding.name}" if self.encoding else ""
+        return f"{self.distribution.name}{suffix}"
+
+    @property
+    def stored(self) -> Parameter:
+        """Name, symbol and range of the number that the user gives or gets."""
+        return self.encoding.stored if self.encoding else self.distribution.parameter
+
+    def decode(self, values: ArrayLike) -> Array:
+        """Return the parameters (float64) for stored values; raise if one is illegal."""
+        stored = np.asarray(self.stored.check(values, self.label), dtype=np.float64)
+        parameter = self.encoding.decode(stored) if self.encoding else stored
+        checked: Array = np.asarray(
+            self.distribution.parameter.check(parameter, self.distribution.name)
+        )
+        return checked
+
+    def encode(self, parameter: Array) -> Array:
+        """Return the stored values for parameters; NaN where they cannot be stored."""
+        if not self.encoding:
+            return parameter
+        with np.errstate(invalid="ignore"):
+            stored = self.encoding.encode(parameter)
+        return np.where(self.stored.accepts(stored), stored, np.nan)
+
+
+def endpoint(name: str | Endpoint, gamma: float | None = None) -> Endpoint:
+    """Return the endpoint for a name such as ``"ggx"`` or ``"ggx:roughness"``.
+
+    Parameters
+    ----------
+    name : str or Endpoint
+        Distribution, with an encoding after a colon if it is not the parameter itself.
+    gamma : float, optional
+        γ for GTR; other distributions ignore it.
+
+    Raises
+    ------
+    MdfconvError
+        If the distribution or the encoding is not known.
+    """
+    if isinstance(name, Endpoint):
+        return name
+    head, colon, tail = name.partition(":")
+    found = distribution(head)
+    if gamma is not None and isinstance(found, GTR):
+        found = GTR(gamma)
+    return Endpoint(found, _encoding(found, tail) if colon else None)
+
+
+def _encoding(owner: Distribution, name: str) -> Encoding | None:
+    key = name.strip().lower()
+    known = {entry.name: entry for entry in owner.encodings}
+    if not known:
+        raise MdfconvError(
+            f"{owner.name} has no encoding '{name}': its {owner.parameter.name} "
+            f"{owner.parameter.symbol} is given as it is"
+        )
+    if key == DEFAULT_ENCODING:
+        return None
+    if key not in known:
+        raise unknown_name(f"encoding of {owner.name}", name, [DEFAULT_ENCODING, *known])
+    return known[key]
+
+
+def same_family(source: Any, target: Any) -> bool:
+    """Return whether two distributions take the same parameter for the same lobe."""
+    gammas = [side.gamma if isinstance(side, GTR) else None for side in (source, target)]
+    return bool(source.name == target.name and gammas[0] == gammas[1])

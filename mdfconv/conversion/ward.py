@@ -1,0 +1,23 @@
+"""Ward's rule between Beckmann and Blinn/Phong."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mdfconv.conversion.formulas import Formula, FormulaMethod
+
+
+class Ward(FormulaMethod):
+    """m_B² N = 2: the rule of thumb of Ward 1996, eq. (11) in Sawicki 2021."""
+
+    name = "ward"
+    keeps = "shape of a smooth lobe, roughly"
+    source = "Ward 1996; Sawicki 2021, eq. (11)"
+
+
+METHOD = Ward(
+    {
+        ("beckmann", "blinn-phong"): Formula("N = 2/m_B² (eq. 11)", lambda m: 2 / m**2),
+        ("blinn-phong", "beckmann"): Formula("m_B = √(2/N) (eq. 11)", lambda n: np.sqrt(2 / n)),
+    }
+)

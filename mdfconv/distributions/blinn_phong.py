@@ -1,0 +1,53 @@
+"""The Blinn/Phong distribution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mdfconv.distributions.base import Distribution
+from mdfconv.distributions.evaluation import Array, tangent_square
+from mdfconv.distributions.parameter import Parameter
+
+
+class BlinnPhong(Distribution):
+    """A power of the cosine: Phong 1975; Blinn 1977.
+
+    Unit form::
+
+        D̄ = cos^N β = exp(−½ N ln(1 + tan²β)).
+
+    Normalized by (N+2)/(2π). The tangent keeps the digits both near β = 0, where
+    ln cos β = ln(1 − …) loses them, and near π/2, where ln(1 − sin²β) does.
+    """
+
+    name = "blinn-phong"
+    aliases = ("phong", "blinn")
+    unit_formula = "cos^N β"
+    normalized_formula = "(N+2)/(2π) cos^N β"
+    source = "Phong 1975; Blinn 1977; Lewis 1994"
+    parameter = Parameter("exponent", "N", usual="N ≥ 1")
+
+    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
+        value = tangent_square(beta, out)
+        np.log1p(value, out=value)
+        value *= -0.5 * parameter
+        return np.exp(value, out=value)
+
+    def _at_normal(self, parameter: Array) -> Array:
+        return (parameter + 2) / (2 * np.pi)
+
+    def _half_tangent(self, parameter: Array) -> Array:
+        return np.sqrt(np.expm1(2 * np.log(2) / parameter))
+
+    def _from_half_tangent(self, tangent: Array) -> Array:
+        # Sawicki 2021, eq. (3): N = −ln 2 / ln cos β_half.
+        return 2 * np.log(2) / np.log1p(np.square(tangent))
+
+    def _peak_alpha(self, parameter: Array) -> Array:
+        return np.sqrt(2 / (parameter + 2))
+
+    def _from_peak_alpha(self, alpha: Array) -> Array:
+        return 2 * (1 - alpha) * (1 + alpha) / np.square(alpha)
+
+
+DISTRIBUTION = BlinnPhong()

@@ -1,0 +1,127 @@
+"""Blocked evaluation of elementwise kernels.
+
+A kernel is written as plain NumPy expressions. Evaluated on a whole array, each
+operation would stream through memory and allocate an array of its own; evaluated
+block by block, its intermediates stay in the cache and the only large allocation
+is the result.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mdfconv.errors import MdfconvError
+
+Array: TypeAlias = NDArray[np.floating[Any]]
+Kernel: TypeAlias = Callable[..., Any]
+
+# Large enough to hide the cost of a call, small enough for the intermediates to stay in cache.
+_LARGEST_BLOCK = 65536
+_SMALLEST_BLOCK = 512
+# Smaller arrays get smaller blocks, so that the intermediates stay a fraction of the result.
+_BLOCKS_AT_LEAST = 64
+
+
+def as_operand(values: ArrayLike) -> Any:
+    """Return real numbers in a form that takes part in NumPy's type promotion.
+
+    Parameters
+    ----------
+    values : array_like
+        Real numbers. Python numbers stay as they are, so that they do not widen float32.
+
+    Raises
+    ------
+    MdfconvError
+        If the values are not real numbers.
+    """
+    if type(values) in (int, float):
+        return float(values)  # type: ignore[arg-type]
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise MdfconvError("expected numbers in an array of a regular shape") from None
+    if array.dtype.kind not in "fiu":
+        raise MdfconvError(f"expected real numbers, got {array.dtype.name}")
+    return array
+
+
+def computing_dtype(*operands: Any) -> tuple[np.dtype[Any], np.dtype[Any]]:
+    """Return the type to compute in and the type of the result.
+
+    Both are float32 for float32 input, float64 otherwise; float16 is computed in
+    float32 and returned as float16.
+    """
+    promoted = np.result_type(*operands)
+    if promoted == np.float16:
+        return np.dtype(np.float32), promoted
+    single = promoted == np.float32
+    dtype = np.dtype(np.float32 if single else np.float64)
+    return dtype, dtype
+
+
+def evaluate(kernel: Kernel, beta: ArrayLike, *operands: ArrayLike) -> Any:
+    """Evaluate a kernel over the broadcast of an angle and its parameters.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(beta, *operands, out)`` maps one-dimensional blocks to a block of values,
+        which it writes to `out`. The block of angles is as long as `out`; a parameter that
+        is constant over the block arrives with one element. They must not be written to.
+    beta : array_like
+        Angle between surface normal and half vector, radians, even. Beyond ±π/2 a facet
+        faces away from the surface and the value is 0.
+    *operands : array_like
+        Parameters that broadcast against `beta`.
+
+    Returns
+    -------
+    numpy.ndarray or numpy scalar
+        The values, in the broadcast shape.
+    """
+    inputs = [as_operand(beta), *(as_operand(operand) for operand in operands)]
+    dtype, result_dtype = computing_dtype(*inputs)
+    arrays = [np.asarray(value) for value in inputs]
+    try:
+        size = math.prod(np.broadcast_shapes(*(array.shape for array in arrays)))
+    except ValueError:
+        shapes = ", ".join(str(array.shape) for array in arrays)
+        raise MdfconvError(f"shapes {shapes} do not broadcast against each other") from None
+    iterator = np.nditer(  # type: ignore[call-overload]
+        [*arrays, None],
+        flags=["external_loop", "buffered", "zerosize_ok"],
+        op_flags=[["readonly"]] * len(arrays) + [["writeonly", "allocate"]],
+        op_dtypes=[dtype] * (len(arrays) + 1),
+        casting="same_kind",
+        buffersize=min(_LARGEST_BLOCK, max(_SMALLEST_BLOCK, size // _BLOCKS_AT_LEAST)),
+    )
+    horizon = dtype.type(np.pi / 2)
+    # Read as integers, floats from 0 to π/2 keep their order and all others (negative, NaN)
+    # are larger: one reduction shows that nothing needs a closer look.
+    bits = np.dtype(f"u{dtype.itemsize}")
+    with iterator, np.errstate(all="ignore"):
+        for *blocks, out in iterator:
+            angle, *rest = blocks
+            kernel(angle, *(b[:1] if b.strides[0] == 0 else b for b in rest), out)
+            if angle.view(bits).max() > horizon.view(bits):
+                out[np.abs(angle) > horizon] = 0
+        result: Any = iterator.operands[-1]
+    return result.astype(result_dtype, copy=False)[()]
+
+
+def inverse_square(values: Array) -> Array:
+    """Return 1/values², finite even where values² underflows, so that 0 times it is 0."""
+    inverse: Array = np.minimum(1 / (values * values), np.finfo(values.dtype).max)
+    return inverse
+
+
+def tangent_square(beta: Array, out: Array | None = None) -> Array:
+    """Return tan²β, the variable in which the kernels keep their digits up to π/2."""
+    tangent: Array = np.tan(beta, out=out)
+    return np.square(tangent, out=tangent)

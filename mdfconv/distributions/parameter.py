@@ -1,0 +1,128 @@
+"""Parameters, their legal ranges, and the encodings in which they are stored."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mdfconv.distributions.evaluation import Array, as_operand
+from mdfconv.errors import MdfconvError
+
+
+def number_text(value: float) -> str:
+    """Return a number as mdfconv writes it in messages: ten significant digits."""
+    return f"{value:.10g}"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One scalar parameter of a distribution: its name, symbol and range.
+
+    Parameters
+    ----------
+    name : str
+        The field's name for it, such as ``"roughness"`` or ``"exponent"``.
+    symbol : str
+        The symbol in the source, such as ``"m_B"``.
+    lower, upper : float
+        The legal range. It is closed where `lower_closed` and `upper_closed` say so.
+    usual : str
+        The range in which scenes use it, in words for the reader.
+    """
+
+    name: str
+    symbol: str
+    lower: float = 0.0
+    upper: float = float("inf")
+    lower_closed: bool = False
+    upper_closed: bool = False
+    usual: str = ""
+
+    @property
+    def legal(self) -> str:
+        """The legal range in words, such as ``"0 < α ≤ 1"``."""
+        above = "≤" if self.lower_closed else "<"
+        below = "≤" if self.upper_closed else "<"
+        lower, upper = number_text(self.lower), number_text(self.upper)
+        if self.upper == float("inf"):
+            return f"{self.symbol} {'≥' if self.lower_closed else '>'} {lower}"
+        return f"{lower} {above} {self.symbol} {below} {upper}"
+
+    def accepts(self, values: Array) -> Any:
+        """Return where values are finite and inside the legal range (bool, same shape)."""
+        low = values >= self.lower if self.lower_closed else values > self.lower
+        high = values <= self.upper if self.upper_closed else values < self.upper
+        return low & high & (values < np.inf)
+
+    def check(self, values: ArrayLike, owner: str) -> Any:
+        """Return the values as real operands, or say which one is illegal and why.
+
+        Parameters
+        ----------
+        values : array_like
+            Candidate parameters.
+        owner : str
+            The distribution they belong to, for the message.
+
+        Raises
+        ------
+        MdfconvError
+            If a value is not a finite number inside the legal range.
+        """
+        operand = as_operand(values)
+        array = np.asarray(operand)
+        if array.size == 0 or (
+            # Two reductions need no memory; NaN fails both comparisons.
+            self.accepts(array.min()) and self.accepts(array.max())
+        ):
+            return operand
+        index = int(np.argmin(self.accepts(array)))
+        bad = float(array.flat[index])
+        which = f" (value {index + 1} of {array.size})" if array.size > 1 else ""
+        what = "not a finite number" if not np.isfinite(bad) else "outside the legal range"
+        raise MdfconvError(
+            f"{owner} {self.symbol} = {number_text(bad)} is {what}{which}: {self.legal}"
+        )
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """The form in which artists or files store a distribution's parameter.
+
+    Parameters
+    ----------
+    name : str
+        The word after the colon in ``ggx:roughness``.
+    stored : Parameter
+        Name, symbol and range of the stored value.
+    decode, encode : callable
+        Stored value to parameter, and back; elementwise on arrays.
+    formula : str
+        The relation in words.
+    """
+
+    name: str
+    stored: Parameter
+    decode: Callable[[Array], Array]
+    encode: Callable[[Array], Array]
+    formula: str
+
+
+ROUGHNESS = Encoding(
+    "roughness",
+    Parameter("roughness", "r", 0.0, 1.0, upper_closed=True, usual="0 < r ≤ 1"),
+    np.square,
+    np.sqrt,
+    "α = r²",
+)
+GLOSSINESS = Encoding(
+    "glossiness",
+    Parameter("glossiness", "g", 0.0, 1.0, lower_closed=True, usual="0 ≤ g < 1"),
+    lambda stored: np.square(1 - stored),
+    lambda alpha: 1 - np.sqrt(alpha),
+    "α = (1 − g)²",
+)

@@ -1,0 +1,72 @@
+"""Sawicki's rational distribution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mdfconv.distributions.base import Distribution
+from mdfconv.distributions.evaluation import Array, tangent_square
+from mdfconv.distributions.parameter import Parameter
+
+_NEWTON_STEPS = 12
+
+
+class Sawicki(Distribution):
+    """A Padé-like stand-in for the power of the cosine: Sawicki 2006.
+
+    Unit form, with c = cos β and v = 1 − c::
+
+        D̄ = 256 c / ((1−N) c + N + 3)⁴ = c / (1 + ¼ (N−1) v)⁴.
+
+    Normalized by 96 (3+N) / (256 π). The second form has no difference of large numbers;
+    v = t²/(s(1+s)) and c = 1/s come from t = tan β, s = √(1+t²).
+    """
+
+    name = "sawicki"
+    unit_formula = "256 cos β / ((1−N) cos β + N + 3)⁴"
+    normalized_formula = "96 (3+N) cos β / (π ((1−N) cos β + N + 3)⁴)"
+    source = "Sawicki 2006"
+    parameter = Parameter("exponent", "N_DS", usual="N_DS ≥ 1")
+
+    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
+        value = tangent_square(beta, out)
+        sum_ = 1 + value
+        secant = np.sqrt(sum_)
+        sum_ += secant
+        value /= sum_
+        value *= 0.25 * (parameter - 1)
+        value += 1
+        np.square(value, out=value)
+        np.square(value, out=value)
+        value *= secant
+        return np.divide(1, value, out=value)
+
+    def _at_normal(self, parameter: Array) -> Array:
+        return 3 * (3 + parameter) / (8 * np.pi)
+
+    def _half_tangent(self, parameter: Array) -> Array:
+        # ½ (1 + kv)⁴ = 1 − v, k = (N−1)/4: convex and rising in v, so Newton steps from a point
+        # to the right of the root close in on it.
+        k = 0.25 * (parameter - 1)
+        start = np.expm1(np.log(2) / 4)
+        v = np.where(k > start, start / np.where(k > start, k, 1), 1.0)
+        for _ in range(_NEWTON_STEPS):
+            base = 1 + k * v
+            value = 0.5 * base**4 - 1 + v
+            v = v - value / (2 * k * base**3 + 1)
+        return np.sqrt(v * (2 - v)) / (1 - v)
+
+    def _from_half_tangent(self, tangent: Array) -> Array:
+        # Sawicki 2021, eq. (10), as 1 + 4 ((2c)^¼ − 1)/(1 − c), which stays accurate as c → 1.
+        secant = np.sqrt(1 + np.square(tangent))
+        drop = np.square(tangent) / (secant * (1 + secant))
+        return 1 + 4 * np.expm1(0.25 * np.log(2 / secant)) / drop
+
+    def _peak_alpha(self, parameter: Array) -> Array:
+        return np.sqrt(8 / (3 * (3 + parameter)))
+
+    def _from_peak_alpha(self, alpha: Array) -> Array:
+        return 8 / (3 * np.square(alpha)) - 3
+
+
+DISTRIBUTION = Sawicki()

@@ -1,0 +1,79 @@
+"""Schlick's rational approximation of Beckmann."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mdfconv.distributions.base import Distribution
+from mdfconv.distributions.double_double import distance_to_cosine
+from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
+from mdfconv.distributions.parameter import Parameter
+
+# Where y = x/m is smaller than this, 1 − w is a difference of numbers that agree in too many digits
+# for the type at hand.
+_EDGE = {np.dtype(np.float32): 1e-2, np.dtype(np.float64): 5e-4}
+
+
+class Schlick(Distribution):
+    """Beckmann as a rational function: Schlick 1994 (An Inexpensive BRDF Model).
+
+    Unit form, with x = cos β + m − 1 ≥ 0 and 0 where x < 0::
+
+        D̄ = m⁵ x / (cos β (m x² − x² + m²)²)
+           = y / (cos β (1 + (1−m)/m · w (2−w))²),   w = (1 − cos β)/m, y = 1 − w = x/m.
+
+    Normalized by 1/(π m²), exactly. The parameter is Beckmann's m. The second form has no
+    difference that vanishes for smooth surfaces; 1 − cos β = 2 sin²(β/2) keeps its digits.
+    """
+
+    name = "schlick"
+    unit_formula = "m⁵ x / (cos β (m x² − x² + m²)²), x = cos β + m − 1; 0 where x < 0"
+    normalized_formula = "m³ x / (π cos β (m x² − x² + m²)²)"
+    source = "Schlick 1994, An Inexpensive BRDF Model for Physically-Based Rendering"
+    parameter = Parameter("alpha", "m_B", upper=1.0, upper_closed=True, usual="0 < m_B ≤ 1")
+
+    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
+        # tan²(β/2)/(1+tan²(β/2)) = ½ (1 − cos β)
+        w = tangent_square(0.5 * beta)
+        w /= 1 + w
+        w *= 2 / parameter
+        y = np.subtract(1, w, out=out)
+        _sharpen_edge(y, beta, parameter)
+        np.maximum(y, 0, out=y)
+        np.minimum(w, 1, out=w)
+        fall = 2 - w
+        fall *= w
+        fall *= (1 - parameter) / parameter
+        fall += 1
+        np.square(fall, out=fall)
+        # cos β from y, not from the tangent: at m = 1 the two cancel to the last bit.
+        fall *= (1 - parameter) + y * parameter
+        y /= fall
+        return y
+
+    def _at_normal(self, parameter: Array) -> Array:
+        return inverse_square(parameter) / np.pi
+
+    def _peak_alpha(self, parameter: Array) -> Array:
+        return parameter
+
+    def _from_peak_alpha(self, alpha: Array) -> Array:
+        return alpha
+
+
+def _sharpen_edge(y: Array, beta: Array, parameter: Array) -> None:
+    """Recompute y = x/m where it nearly vanishes, in place and to working precision."""
+    threshold = _EDGE[y.dtype]
+    if not (y.min() < threshold and y.max() > -threshold):
+        return
+    near = np.abs(y) < threshold
+    angle, m = (np.broadcast_to(a, y.shape)[near].astype(float) for a in (beta, parameter))
+    # Rounded to float32, π/2 exceeds π/2.
+    angle = np.minimum(np.abs(angle), np.pi / 2)
+    if y.dtype == np.float64:
+        y[near] = distance_to_cosine(angle, m) / m
+    else:
+        y[near] = 1 - 2 * np.square(np.sin(0.5 * angle)) / m
+
+
+DISTRIBUTION = Schlick()

@@ -1,0 +1,61 @@
+"""The Smoothie distribution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mdfconv.distributions.base import Distribution
+from mdfconv.distributions.evaluation import Array, inverse_square
+from mdfconv.distributions.ggx import trowbridge_reitz
+from mdfconv.distributions.parameter import Parameter
+
+_EXCESS = np.sqrt(2) - 1
+
+
+class Smoothie(Distribution):
+    """The empirical BRDF's distribution, which is Trowbridge-Reitz in another parameter.
+
+    Unit form::
+
+        D̄ = [α² / (α² + 4 sin²β)]² = [1 + (2 sin β/α)²]^(−2).
+
+    Normalized by (α²+4)/(π α²). With α_ggx = α/√(4+α²) it is GGX.
+    """
+
+    name = "smoothie"
+    unit_formula = "[α² / (α² + 4 sin²β)]²"
+    normalized_formula = "(α²+4)/(π α²) [α² / (α² + 4 sin²β)]²"
+    source = "Smoothie: an empirical BRDF (web article)"
+    parameter = Parameter("alpha", "α_s", usual="0 < α_s ≤ 1")
+
+    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
+        return trowbridge_reitz(beta, 1 + 4 * inverse_square(parameter), out)
+
+    def _at_normal(self, parameter: Array) -> Array:
+        return (1 + 4 * inverse_square(parameter)) / np.pi
+
+    def _half_tangent(self, parameter: Array) -> Array:
+        square = 0.25 * _EXCESS * np.square(parameter)
+        return np.sqrt(square / (1 - square))
+
+    def _from_half_tangent(self, tangent: Array) -> Array:
+        return 2 * tangent / np.sqrt(_EXCESS * (1 + np.square(tangent)))
+
+    def _peak_alpha(self, parameter: Array) -> Array:
+        return to_ggx(parameter)
+
+    def _from_peak_alpha(self, alpha: Array) -> Array:
+        return from_ggx(alpha)
+
+
+def to_ggx(alpha: Array) -> Array:
+    """Return the α of the GGX that equals Smoothie's α: α/√(4+α²)."""
+    return alpha / np.hypot(2, alpha)
+
+
+def from_ggx(alpha: Array) -> Array:
+    """Return Smoothie's α for a GGX α < 1: 2α/√(1−α²); inf or NaN from 1 on."""
+    return 2 * alpha / np.sqrt((1 - alpha) * (1 + alpha))
+
+
+DISTRIBUTION = Smoothie()

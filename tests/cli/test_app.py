@@ -1,0 +1,74 @@
+"""The command line as a whole: help, version, list, completion, start-up."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+import mdfconv
+from tests.cli.runner import run
+
+
+def test_version_and_help():
+    assert run("--version") == (0, f"mdfconv {mdfconv.__version__}\n", "")
+    status, out, err = run("--help")
+    assert (status, err) == (0, "")
+    assert "mdfconv convert --from beckmann --to ggx 0.2" in out
+    assert run()[:2] == (status, out)
+
+
+@pytest.mark.parametrize("command", ["convert", "list"])
+def test_every_command_has_help_with_examples(command):
+    status, out, _ = run(command, "--help")
+    assert status == 0
+    assert "Examples:" in out
+    assert f"mdfconv {command}" in out
+
+
+def test_unknown_command():
+    status, out, err = run("konvert")
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+
+
+def test_list():
+    assert run("list")[1].split() == [entry.name for entry in mdfconv.list_distributions()]
+    status, out, _ = run("list", "--format", "json")
+    assert status == 0
+    found = {record["name"]: record for record in json.loads(out)}
+    assert found["ggx"]["aliases"] == ["trowbridge-reitz", "tr"]
+    assert found["ggx"]["encodings"] == {"roughness": "α = r²", "glossiness": "α = (1 − g)²"}
+    assert found["ggx"]["anisotropic"]
+    assert found["gtr"]["parameters"][1]["symbol"] == "γ"
+    assert all(record["source"] and record["unit_form"] for record in found.values())
+    status, out, _ = run("list", "--format", "table")
+    assert status == 0
+    assert "trowbridge-reitz" in out
+
+
+def test_completion():
+    environment = {"COMP_WORDS": "mdfconv convert --from be", "COMP_CWORD": "3"}
+    # Completion is bound to the name of the installed program, which `python -m` is not.
+    script = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import sys; sys.argv[0] = 'mdfconv'; from mdfconv.cli import main; main()",
+        ],
+        capture_output=True,
+        env={**environment, "_MDFCONV_COMPLETE": "complete_bash", "PATH": "/usr/bin:/bin"},
+        check=False,
+    )
+    assert script.stdout.decode().split() == ["beckmann"]
+
+
+def test_start_up_imports_only_what_the_command_needs():
+    code = (
+        "import sys; sys.argv = ['mdfconv', 'convert', '--from', 'beckmann', '--to', 'ggx', '1'];"
+        "from mdfconv.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: print(sorted({'scipy', 'matplotlib', 'rich.table'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"

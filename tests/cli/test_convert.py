@@ -1,0 +1,185 @@
+"""``mdfconv convert`` as a process."""
+
+import csv
+import io
+import json
+import re
+import subprocess
+
+import pytest
+
+import mdfconv
+from tests.cli.runner import COMMAND, run, run_on_terminal
+
+
+def test_main_job_in_a_pipe():
+    assert run("convert", "--from", "beckmann", "--to", "ggx", 0.2) == (0, "0.23552\n", "")
+
+
+def test_several_values_and_standard_input():
+    expected = "0.1194400000\n0.23552\n".replace("0.1194400000", "0.11944")
+    assert run("convert", "--from", "beckmann", "--to", "ggx", 0.1, 0.2)[1] == expected
+    status, out, _ = run("convert", "--from", "beckmann", "--to", "ggx", "-", stdin="0.1\r\n\n 0.2")
+    assert (status, out) == (0, expected)
+
+
+def test_pair():
+    status, out, _ = run("convert", "--from", "ashikhmin-shirley", "--to", "ggx", "100,20")
+    assert status == 0
+    assert out == "0.1660059663,0.3428457736\n"
+
+
+def test_json():
+    status, out, err = run(
+        "convert", "--from", "phong", "--to", "ggx:roughness", "--format", "json", 100, 2
+    )
+    assert (status, err) == (0, "")
+    first, second = json.loads(out)
+    assert list(first) == [
+        "from", "to", "value", "result", "method", "rmse", "max_error", "notes",
+    ]  # fmt: skip
+    assert first["from"] == "blinn-phong"
+    assert first["to"] == "ggx:roughness"
+    assert first["value"] == 100
+    assert first["result"] == mdfconv.convert(100, "blinn-phong", "ggx:roughness")
+    assert first["method"] == "closed-form"
+    assert 0 < first["rmse"] < first["max_error"] < 0.1
+    assert isinstance(first["notes"], list)
+    assert "outside the paper's sweep" in second["notes"][0]
+
+
+def test_csv():
+    status, out, _ = run("convert", "--from", "beckmann", "--to", "ggx", "--format", "csv", 0.3)
+    assert status == 0
+    (row,) = csv.DictReader(io.StringIO(out))
+    assert float(row["result"]) == mdfconv.convert(0.3, "beckmann", "ggx")
+    assert row["from"] == "beckmann"
+    status, out, _ = run(
+        "convert", "--from", "ashikhmin-shirley", "--to", "beckmann", "--format", "csv", "9,8"
+    )
+    (row,) = csv.DictReader(io.StringIO(out))
+    assert row["value"] == "9.0,8.0"
+
+
+def test_all_targets():
+    status, out, err = run("convert", "--from", "beckmann", "--to", "all", 0.2)
+    assert status == 0
+    assert dict(line.split() for line in out.splitlines()) == {
+        "gauss": "0.2044728",
+        "ggx": "0.23552",
+        "gtr": "0.23552",
+        "blinn-phong": "47.5",
+        "schlick": "0.2",
+        "sawicki": "56.065",
+        "smoothie": "0.4846741243",
+    }
+    assert err == ""
+    status, out, err = run("convert", "--from", "beckmann", "--to", "all", 0.9)
+    assert status == 0
+    assert "blinn-phong" not in out
+    assert "left out: for beckmann m_B = 0.9 closed-form gives blinn-phong N = -0.03" in err
+
+
+def test_caution_goes_to_standard_error():
+    status, out, err = run("convert", "--from", "beckmann", "--to", "ggx", 0.8)
+    assert (status, out) == (0, "0.67328\n")
+    assert err.startswith("mdfconv: note: outside the paper's sweep")
+    assert err.count("\n") == 1
+
+
+def test_gamma():
+    arguments = ("convert", "--from", "ggx", "--to", "gtr", "--gamma", "3", "0.2")
+    status, out, _ = run(*arguments, "--method", "half-angle")
+    assert status == 0
+    assert float(out) == pytest.approx(0.2495316462)
+    assert run(*arguments)[0] == 2
+
+
+def test_table_on_a_terminal():
+    status, out = run_on_terminal("convert", "--from", "beckmann", "--to", "ggx", "0.2")
+    assert status == 0
+    assert "\x1b[1m" in out
+    rows = [line for line in out.splitlines() if "0.23552" in line or "peak" in line]
+    assert "closed-form" in rows[0]
+    assert "peak" in rows[-1]
+    for method in ("half-angle", "ward", "peak"):
+        assert method in out
+    plain = run_on_terminal("convert", "--from", "beckmann", "--to", "ggx", "0.2", NO_COLOR="1")[1]
+    assert not re.search(r"\x1b\[[39][0-7]m", plain)
+    assert "0.23552" in plain
+
+
+def test_table_in_a_pipe_has_no_escapes():
+    status, out, _ = run("convert", "--from", "ggx", "--to", "all", "--format", "table", 0.2)
+    assert status == 0
+    assert "\x1b" not in out
+    assert "blinn-phong N" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--from", "bekman", "--to", "ggx", "0.2"), "did you mean beckmann"),
+        (("--from", "ggx", "--to", "phon", "0.2"), "did you mean phong"),
+        (("--from", "ggx", "--to", "gauss", "1.5"), "0 < α ≤ 1"),
+        (("--from", "beckmann", "--to", "ggx", "-0.2"), "m_B > 0"),
+        (("--from", "beckmann", "--to", "ggx", "nan"), "not a finite number"),
+        (("--from", "beckmann", "--to", "ggx", "-inf"), "not a finite number"),
+        (("--from", "beckmann", "--to", "ggx", "rough"), "'rough' is not a number"),
+        (("--from", "beckmann", "--to", "ggx", "0.1", "x"), "value 2 of 2: 'x'"),
+        (("--from", "beckmann", "--to", "ggx", "0.1", "7e400"), "value 2 of 2"),
+        (("--from", "beckmann", "--to", "ggx", "1,2,3"), "not a pair"),
+        (("--from", "beckmann", "--to", "ggx", "1,"), "not a number"),
+        (("--from", "phong", "--to", "ggx", "10,20"), "use ashikhmin-shirley"),
+        (("--from", "gauss:roughness", "--to", "ggx", "0.1"), "gauss has no encoding"),
+        (("--from", "beckmann", "--to", "phong", "0.9"), "half-angle answers"),
+        (("--from", "beckmann", "--to", "ggx", "--method", "wart", "0.2"), "did you mean ward"),
+        (("--from", "ggx", "--to", "gtr", "--gamma", "-1", "0.2"), "γ > 0"),
+        (("--from", "beckmann", "--to", "ggx", "-"), "holds no values"),
+        (("--from", "beckmann", "--to", "ggx"), "Missing argument"),
+        (("--to", "ggx", "0.2"), "Missing option '--from'"),
+        (
+            ("--from", "beckmann", "--to", "ggx", "--metod", "ward", "0.2"),
+            "no such option: --metod",
+        ),
+        (("--from", "beckmann", "--to", "ggx", "--format", "xml", "0.2"), "'xml' is not one of"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_status_two(arguments, words):
+    status, out, err = run("convert", *arguments)
+    assert (status, out) == (2, "")
+    assert words in err
+    assert err.count("\n") == 1
+    assert err.startswith("mdfconv: ")
+
+
+def test_bad_lines_of_standard_input_are_numbered():
+    arguments = ("convert", "--from", "beckmann", "--to", "ggx", "-")
+    status, out, err = run(*arguments, stdin="0.1\nabc\n")
+    assert (status, out) == (2, "")
+    assert "line 2 of standard input: 'abc' is not a number" in err
+    status, out, err = run(*arguments, stdin=b"\xff\xfe0")
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+
+
+def test_a_closed_pipe_is_no_error():
+    source = subprocess.Popen(
+        [*COMMAND, "convert", "--from", "beckmann", "--to", "ggx", *["0.2"] * 20000],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    source.stdout.readline()
+    source.stdout.close()
+    assert source.stderr.read() == b""
+    source.stderr.close()
+    assert source.wait(timeout=60) == 0
+
+
+def test_a_terminal_without_unicode():
+    status, out, _ = run(
+        "convert", "--from", "beckmann", "--to", "ggx", "--format", "table", "0.2",
+        PYTHONIOENCODING="ascii",
+    )  # fmt: skip
+    assert status == 0
+    assert "0.23552" in out

@@ -1,0 +1,70 @@
+"""The README tells the truth: its examples are run, its commands exist."""
+
+import doctest
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+import mdfconv
+from tests.cli.runner import run
+
+README = (Path(__file__).parents[1] / "README.md").read_text()
+CONSOLE = re.findall(r"```console\n(.*?)```", README, re.S)
+
+
+def examples():
+    """Return (command line, expected output) for every prompt in a console block."""
+    for block in CONSOLE:
+        for chunk in re.split(r"^\$ ", block, flags=re.M)[1:]:
+            line, _, expected = chunk.partition("\n")
+            yield line, expected
+
+
+@pytest.mark.parametrize(("line", "expected"), list(examples()))
+def test_console_example(line, expected, tmp_path):
+    if not line.startswith("mdfconv"):
+        assert re.match(r"make (demo|test)$|pip install", line)
+        return
+    # The README shows what a terminal shows: a table.
+    words = shlex.split(line)[1:]
+    if words[0] == "convert" and "--format" not in words:
+        words += ["--format", "table"]
+    status, out, _ = run(*words, cwd=tmp_path)
+    assert status == 0
+    assert normal(out) == normal(expected)
+
+
+def normal(text):
+    return [" ".join(line.split()) for line in text.splitlines() if line.strip(" ─")]
+
+
+def test_python_examples():
+    module = doctest.testmod(mdfconv)
+    parser = doctest.DocTestParser()
+    test = parser.get_doctest(
+        "\n".join(re.findall(r"```pycon\n(.*?)```", README, re.S)), {}, "README", "README.md", 0
+    )
+    outcome = doctest.DocTestRunner().run(test)
+    assert outcome.failed == module.failed == 0
+    assert outcome.attempted > 3
+    assert module.attempted
+
+
+@pytest.mark.parametrize("module", ["mdfconv.conversion", "mdfconv.distributions"])
+def test_docstring_examples(module):
+    found = doctest.testmod(__import__(module, fromlist=["_"]))
+    assert found.failed == 0
+    assert found.attempted
+
+
+def test_every_command_and_distribution_is_documented():
+    from mdfconv.cli import _COMMANDS
+
+    for command in _COMMANDS:
+        assert f"mdfconv {command}" in README
+    for entry in mdfconv.list_distributions():
+        assert f"`{entry.name}`" in README
+    for method in mdfconv.list_methods():
+        assert f"`{method.name}`" in README

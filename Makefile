@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test clean
+.PHONY: demo test report clean
 demo: $(VENV)/installed
 	$(BIN)/mdfconv convert --from beckmann --to ggx 0.2 --format table
 
@@ -12,6 +12,9 @@ test: $(VENV)/installed-test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest
+
+report: $(VENV)/installed
+	$(BIN)/mdfconv report --output reports
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

@@ -71,6 +71,11 @@ UPPER = {"beckmann": 100, "gauss": 100, "ggx": 1, "schlick": 1, "smoothie": 1e6}
 
 def excess_mp(name, beta, p, gamma):
     """Return D(β)/D(0) − ½ for an mpf β, without rounding β to a double."""
+    return ratio_mp(name, beta, p, gamma) - mp.mpf("0.5")
+
+
+def ratio_mp(name, beta, p, gamma):
+    """Return D(β)/D(0) for an mpf β, without rounding β to a double."""
     c, s, p = mp.cos(beta), mp.sin(beta), mp.mpf(p)
     ratio = {
         "beckmann": lambda: mp.exp(-((s / c) ** 2) / p**2) / c**4,
@@ -86,7 +91,7 @@ def excess_mp(name, beta, p, gamma):
         "sawicki": lambda: 256 * c / ((1 - p) * c + p + 3) ** 4,
         "smoothie": lambda: (p**2 / (p**2 + 4 * s**2)) ** 2,
     }
-    return ratio[name]() - mp.mpf("0.5")
+    return ratio[name]()
 
 
 def relative_error(value, exact):

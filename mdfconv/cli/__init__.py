@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import os
 import sys
+from difflib import get_close_matches
 from importlib import import_module
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from mdfconv import __version__
 from mdfconv.errors import MdfconvError
@@ -20,12 +21,37 @@ from mdfconv.errors import MdfconvError
 _COMMANDS = (
     "convert",
     "list",
+    "fit",
+    "fit-table",
+    "report",
 )
 
-# A value may be negative, which looks like an option; the command itself refuses real typos.
+# A value may be negative, which looks like an option: `_Command` sorts out the real typos.
 _CONTEXT = {"help_option_names": ["-h", "--help"], "ignore_unknown_options": True}
 # Typer exports BadParameter but not its base, the family of all mistakes in the arguments.
 _UsageError: type[Any] = typer.BadParameter.__mro__[1]
+
+
+class _Command(TyperCommand):
+    """A command that takes negative numbers for values and other unknown options for mistakes."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:
+        known = [name for entry in self.get_params(ctx) for name in entry.opts]
+        for word in args[: args.index("--")] if "--" in args else args:
+            name = word.partition("=")[0]
+            if len(word) > 1 and word[0] == "-" and name not in known and not _is_number(word):
+                near = get_close_matches(name, known, n=1)
+                hint = f"; did you mean {near[0]}?" if near else ""
+                raise MdfconvError(f"no such option: {name}{hint}")
+        return super().parse_args(ctx, args)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.partition(",")[0])
+    except ValueError:
+        return False
+    return True
 
 
 class _LazyGroup(TyperGroup):
@@ -39,7 +65,7 @@ class _LazyGroup(TyperGroup):
             return None
         module = import_module(f"{__name__}.{name.replace('-', '_')}_command")
         single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-        single.command(name, context_settings=_CONTEXT)(module.command)
+        single.command(name, cls=_Command, context_settings=_CONTEXT)(module.command)
         return typer.main.get_command(single)
 
 
@@ -76,8 +102,11 @@ def main() -> None:
     """Run the command line and exit: 0 for an answer, 2 for a request that has none."""
     for stream in (sys.stdout, sys.stderr):
         # A terminal that cannot show α shows ? instead of a traceback.
-        stream.reconfigure(errors="replace")  # type: ignore[union-attr]
+        if stream is not None:
+            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
+        if sys.stdout is None:
+            raise MdfconvError("standard output is closed")
         status = app(standalone_mode=False)
         sys.stdout.flush()
     except MdfconvError as error:
@@ -90,6 +119,10 @@ def main() -> None:
         # The reader has what it wanted; keep the interpreter from flushing into the pipe again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 0
+    except OSError as error:
+        # Standard output failed (a full disk); what is left in its buffer would fail again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = _refuse(f"cannot write the output: {error.strerror}")
     sys.exit(status or 0)
 
 

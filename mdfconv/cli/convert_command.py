@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import typer
 
-from mdfconv.cli.output import Format, console, csv_text, json_text, value_text
+from mdfconv.cli.output import Format, console, value_text
 from mdfconv.conversion import DEFAULT_METHOD, Conversion, explain, list_methods
 from mdfconv.conversion.endpoint import endpoint
 from mdfconv.distributions import list_distributions
 from mdfconv.distributions.base import AnisotropicDistribution
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import list_metrics
+from mdfconv.reports.text import csv_text, json_text
 
-_COLUMNS = ("from", "to", "value", "result", "method", "rmse", "max_error", "notes")
+_COLUMNS = ("from", "to", "value", "result", "method", "metric", "rmse", "max_error", "notes")
 # With more values than this, the table leaves out what the other methods would give.
 _VALUES_WITH_ALTERNATIVES = 10
 
@@ -25,6 +28,10 @@ def _names(incomplete: str) -> list[str]:
 
 def _methods(incomplete: str) -> list[str]:
     return [entry.name for entry in list_methods() if entry.name.startswith(incomplete)]
+
+
+def _metrics(incomplete: str) -> list[str]:
+    return [name for name in list_metrics() if name.startswith(incomplete)]
 
 
 def command(
@@ -60,9 +67,25 @@ def command(
         typer.Option(
             metavar="METHOD",
             autocompletion=_methods,
-            help="closed-form (keeps the lobe's shape), half-angle, ward or peak.",
+            help="closed-form (keeps the lobe's shape, approximately), half-angle, ward, peak, "
+            "or fit: exact, under the metric.",
         ),
     ] = DEFAULT_METHOD,
+    metric: Annotated[
+        str,
+        typer.Option(
+            metavar="METRIC",
+            autocompletion=_metrics,
+            help="What fit keeps, and what the errors measure: unit (the shape of the lobe), "
+            "energy (the light) or display (the picture on a screen).",
+        ),
+    ] = "unit",
+    exposure: Annotated[
+        float,
+        typer.Option(
+            metavar="E", help="Exposure for the display metric; 1 puts the source's peak at white."
+        ),
+    ] = 1.0,
     gamma: Annotated[
         float | None, typer.Option(metavar="G", help="γ of gtr; 2 if not given, which is ggx.")
     ] = None,
@@ -83,6 +106,8 @@ def command(
 
     mdfconv convert --from blinn-phong --to ggx:roughness 10 100 1000
 
+    mdfconv convert --from beckmann --to ggx --method fit --metric energy 0.2
+
     mdfconv convert --from ashikhmin-shirley --to ggx 100,20
 
     mdfconv convert --from beckmann --to all --format json 0.2
@@ -93,7 +118,8 @@ def command(
     form = format_ or (Format.table if sys.stdout.isatty() else Format.plain)
     every = target.strip().lower() == "all"
     targets = _targets(numbers, source) if every else [target]
-    found, reasons = _convert(numbers, source, targets, method, gamma, form)
+    rule = _Rule(method, metric, exposure, gamma)
+    found, reasons = _convert(numbers, source, targets, rule, errors=form is not Format.plain)
     if reasons and (not every or not found):
         raise reasons[0]
     for reason in reasons:
@@ -101,20 +127,52 @@ def command(
     if form is Format.plain:
         _write_plain(found, named=every)
     elif form is Format.table:
-        _write_tables(found, source, gamma)
+        _write_tables(found, rule)
     else:
         records = [_record(entry) for group in found.values() for entry in group]
         typer.echo(json_text(records) if form is Format.json else _csv(records))
 
 
+@dataclass(frozen=True)
+class _Rule:
+    """How to convert: the options of the command that all targets share."""
+
+    method: str
+    metric: str
+    exposure: float
+    gamma: float | None
+
+    def explain(self, values: Any, source: str, target: str, *, errors: bool) -> list[Conversion]:
+        return explain(
+            values,
+            source,
+            target,
+            self.method,
+            metric=self.metric,
+            exposure=self.exposure,
+            gamma=self.gamma,
+            errors=errors,
+        )
+
+    def others(self) -> list[_Rule]:
+        """Return the other methods, the fit under every metric."""
+        metrics = {"fit": list_metrics()}
+        every = [
+            replace(self, method=entry.name, metric=metric)
+            for entry in list_methods()
+            for metric in metrics.get(entry.name, [self.metric])
+        ]
+        return [rule for rule in every if rule != self]
+
+
 def _read(values: list[str]) -> list[Any]:
     """Return numbers and pairs for the arguments, with standard input in place of ``-``."""
+    if values.count("-") > 1:
+        raise MdfconvError("standard input can be read only once: give one -")
     found: list[Any] = []
     for position, text in enumerate(values, start=1):
         if text == "-":
             found += _read_lines()
-        elif text.startswith("--"):
-            raise MdfconvError(f"no such option: {text}")
         else:
             where = f"value {position} of {len(values)}: " if len(values) > 1 else ""
             found.append(_number(text, where))
@@ -122,8 +180,10 @@ def _read(values: list[str]) -> list[Any]:
 
 
 def _read_lines() -> list[Any]:
+    if sys.stdin is None:
+        raise MdfconvError("standard input is closed")
     try:
-        lines = sys.stdin.read().splitlines()
+        lines = sys.stdin.read().removeprefix("\ufeff").splitlines()
     except UnicodeDecodeError:
         raise MdfconvError("standard input is not text") from None
     found = [
@@ -163,17 +223,15 @@ def _convert(
     numbers: list[Any],
     source: str,
     targets: list[str],
-    method: str,
-    gamma: float | None,
-    form: Format,
+    rule: _Rule,
+    *,
+    errors: bool,
 ) -> tuple[dict[str, list[Conversion]], list[MdfconvError]]:
     """Return the conversions to each target, and why a target has none."""
     found, reasons = {}, []
     for target in targets:
         try:
-            found[target] = explain(
-                numbers, source, target, method, gamma=gamma, errors=form is not Format.plain
-            )
+            found[target] = rule.explain(numbers, source, target, errors=errors)
         except MdfconvError as error:
             reasons.append(error)
     return found, reasons
@@ -188,62 +246,65 @@ def _write_plain(found: dict[str, list[Conversion]], *, named: bool) -> None:
     typer.echo("\n".join(lines))
 
 
-def _write_tables(found: dict[str, list[Conversion]], source: str, gamma: float | None) -> None:
+def _write_tables(found: dict[str, list[Conversion]], rule: _Rule) -> None:
     """Write a table a target: the chosen answer, and what the other methods would give."""
     out = console()
     for group in found.values():
-        out.print(_table(group, source, gamma))
+        out.print(_table(group, rule))
         for note in dict.fromkeys(note for entry in group for note in entry.cautions):
             out.print(f"Note: {note}.")
-    out.print("[dim]Errors: of the unit forms, on β from 0 to 4.8 β_half of the source.[/dim]")
+    out.print(
+        "[dim]Errors: root mean square and maximum, relative to the source's peak, on β from 0 "
+        "to 4.8 β_half; of the unit forms, or in the metric of a fit.[/dim]"
+    )
 
 
-def _table(group: list[Conversion], source: str, gamma: float | None) -> Any:
+def _table(group: list[Conversion], rule: _Rule) -> Any:
     from rich import box
     from rich.table import Table
 
     first = group[0]
-    sides = [endpoint(name, gamma) for name in (first.source, first.target)]
+    sides = [endpoint(name, rule.gamma) for name in (first.source, first.target)]
     given, wanted = (f"{side.label} {side.stored.symbol}" for side in sides)
     table = Table(
         box=box.SIMPLE_HEAD, title=f"{given} → {wanted}", title_style="bold", title_justify="left"
     )
-    table.add_column(given, justify="right")
-    table.add_column(wanted, justify="right", style="bold")
-    table.add_column("method")
-    table.add_column("RMSE", justify="right")
-    table.add_column("max error", justify="right")
-    table.add_column("keeps")
+    table.add_column(given, justify="right", overflow="fold")
+    table.add_column(wanted, justify="right", style="bold", overflow="fold", min_width=12)
+    table.add_column("method", overflow="fold", min_width=11)
+    for heading in ("RMSE", "max error"):
+        table.add_column(heading, justify="right", overflow="fold", min_width=6)
+    table.add_column("keeps", overflow="fold")
     for entry in group:
         table.add_row(*_cells(entry))
         if len(group) <= _VALUES_WITH_ALTERNATIVES:
-            for cells in _alternatives(entry, gamma):
+            for cells in _alternatives(entry, rule):
                 table.add_row(*cells, style="dim not bold")
             table.add_section()
     return table
 
 
 def _cells(entry: Conversion) -> tuple[str, ...]:
+    exact = entry.notes[0].startswith("exact")
+    keeps = entry.notes[0] if exact else entry.notes[len(entry.cautions)].removeprefix("keeps the ")
     return (
         value_text(entry.value),
         value_text(entry.result),
-        entry.method,
+        f"fit {entry.metric}" if entry.method == "fit" else entry.method,
         f"{entry.rmse:.3g}",
         f"{entry.max_error:.3g}",
-        entry.notes[-1],
+        keeps,
     )
 
 
-def _alternatives(entry: Conversion, gamma: float | None) -> list[tuple[str, ...]]:
+def _alternatives(entry: Conversion, rule: _Rule) -> list[tuple[str, ...]]:
     """Return the rows of the methods that were not chosen, with their reason if none."""
     rows: list[tuple[str, ...]] = []
-    for other in list_methods():
-        if other.name == entry.method:
-            continue
+    for other in rule.others():
         try:
-            found = explain(entry.value, entry.source, entry.target, other.name, gamma=gamma)[0]
+            found = other.explain(entry.value, entry.source, entry.target, errors=True)[0]
         except MdfconvError as error:
-            rows.append(("", "—", other.name, "", "", str(error).split(";")[0]))
+            rows.append(("", "—", other.method, "", "", str(error).split(";")[0]))
         else:
             rows.append(("", *_cells(found)[1:]))
     return rows
@@ -256,6 +317,7 @@ def _record(entry: Conversion) -> dict[str, Any]:
         "value": entry.value,
         "result": entry.result,
         "method": entry.method,
+        "metric": entry.metric,
         "rmse": entry.rmse,
         "max_error": entry.max_error,
         "notes": entry.notes,

@@ -8,11 +8,12 @@ from typing import Annotated, Any
 
 import typer
 
-from mdfconv.cli.output import console, json_text
+from mdfconv.cli.output import console
 from mdfconv.distributions import Distribution, list_distributions
 from mdfconv.distributions.base import AnisotropicDistribution
 from mdfconv.distributions.gtr import GTR
 from mdfconv.distributions.parameter import Parameter
+from mdfconv.reports.text import json_text
 
 
 class ListFormat(StrEnum):

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-import csv
 import io
-import json
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 from mdfconv.distributions.parameter import number_text
+from mdfconv.reports.text import (
+    Record,
+    cell_text,
+    csv_text,
+    json_text,
+    markdown_text,
+    write_file,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-_PIPE_WIDTH = 120
+_PIPE_WIDTH = 160
 
 
 class Format(StrEnum):
@@ -25,6 +34,15 @@ class Format(StrEnum):
     plain = "plain"
     csv = "csv"
     json = "json"
+
+
+class TableFormat(StrEnum):
+    """The forms in which tables are written."""
+
+    table = "table"
+    csv = "csv"
+    json = "json"
+    markdown = "markdown"
 
 
 def value_text(value: float | tuple[float, ...]) -> str:
@@ -39,15 +57,59 @@ def console() -> Console:
     return Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False)
 
 
-def json_text(records: Any) -> str:
-    """Return records as indented JSON; NaN and infinities are refused."""
-    return json.dumps(records, indent=2, ensure_ascii=False, allow_nan=False)
+def write_records(
+    columns: Sequence[str],
+    rows: Sequence[Record],
+    form: TableFormat | None,
+    output: Path | None,
+    title: str,
+) -> None:
+    """Write rows to standard output or to a file, in the form asked for.
+
+    Without a form it is a table on a terminal and CSV in a pipe; for a file, what its name
+    ends in.
+    """
+    form = form or _default_form(output)
+    if form is TableFormat.table and output is None:
+        console().print(_rich_table(columns, rows, title))
+        return
+    if form is TableFormat.csv:
+        text = csv_text(columns, rows)
+    elif form is TableFormat.markdown:
+        text = markdown_text(columns, rows)
+    elif form is TableFormat.json:
+        text = json_text([{column: row[column] for column in columns} for row in rows])
+    else:
+        text = _plain_table(columns, rows)
+    if output is None:
+        typer.echo(text)
+    else:
+        write_file(output, f"{text}\n".encode())
 
 
-def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
-    """Return rows as CSV with a header; floats keep their full precision."""
+def _default_form(output: Path | None) -> TableFormat:
+    if output is None:
+        return TableFormat.table if sys.stdout.isatty() else TableFormat.csv
+    endings = {".json": TableFormat.json, ".md": TableFormat.markdown, ".txt": TableFormat.table}
+    return endings.get(output.suffix.lower(), TableFormat.csv)
+
+
+def _rich_table(columns: Sequence[str], rows: Sequence[Record], title: str) -> Any:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, title=title, title_style="bold", title_justify="left")
+    for column in columns:
+        text = any(isinstance(row[column], str) for row in rows)
+        table.add_column(column, justify="left" if text else "right", overflow="fold")
+    for row in rows:
+        table.add_row(*(cell_text(row[column]) for column in columns))
+    return table
+
+
+def _plain_table(columns: Sequence[str], rows: Sequence[Record]) -> str:
+    from rich.console import Console
+
     buffer = io.StringIO()
-    writer = csv.DictWriter(buffer, columns, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return buffer.getvalue().rstrip("\n")
+    Console(file=buffer, width=_PIPE_WIDTH).print(_rich_table(columns, rows, ""))
+    return buffer.getvalue().rstrip()

@@ -13,16 +13,18 @@ import numpy as np
 
 from mdfconv.conversion.endpoint import Endpoint, endpoint, same_family
 from mdfconv.conversion.method import Method
-from mdfconv.conversion.residual import unit_residual
+from mdfconv.conversion.residual import residual
 from mdfconv.distributions.base import AnisotropicDistribution
 from mdfconv.distributions.evaluation import Array, as_operand
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError, unknown_name
+from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.metrics import metric as find_metric
 
 __all__ = ["DEFAULT_METHOD", "Conversion", "convert", "explain", "find_method", "list_methods"]
 
 DEFAULT_METHOD = "closed-form"
-_MODULES = ("closed_form", "half_angle", "ward", "peak")
+_MODULES = ("closed_form", "half_angle", "ward", "peak", "least_squares")
 _ALL: tuple[Method, ...] = tuple(
     import_module(f"{__name__}.{module}").METHOD for module in _MODULES
 )
@@ -41,17 +43,18 @@ class Conversion:
         Distribution and encoding, such as ``"ggx:roughness"``.
     value, result : float or tuple of two floats
         What was converted, and to what; a pair for an anisotropic surface.
-    method : str
-        The method used.
+    method, metric : str
+        The method used, and the metric of the errors (and of the method, if it is "fit").
     route : tuple of str
         The formulas or conditions applied, in order.
     rmse, max_error : float
-        Root mean square and maximum difference of the unit forms on β from 0 to 4.8 β_half
-        of the source, at most π/2; for a pair those of the worse axis.
+        Root mean square and maximum difference, in the metric and relative to the source's
+        peak, on β from 0 to 4.8 β_half of the source, at most π/2; for a pair those of the
+        worse axis.
     cautions : tuple of str
         What this value in particular calls for.
     notes : tuple of str
-        The cautions, and what the method keeps.
+        The cautions, what the method keeps, and the route.
     """
 
     source: str
@@ -59,6 +62,7 @@ class Conversion:
     value: Value
     result: Value
     method: str
+    metric: str
     route: tuple[str, ...]
     rmse: float
     max_error: float
@@ -91,6 +95,8 @@ def convert(
     target: str | Endpoint,
     method: str = DEFAULT_METHOD,
     *,
+    metric: str | Metric = "unit",
+    exposure: float = 1.0,
     gamma: float | None = None,
 ) -> Any:
     """Convert a parameter from one distribution to another.
@@ -103,7 +109,12 @@ def convert(
         Distribution, with an encoding after a colon: ``"ggx:roughness"`` (α = r²),
         ``"ggx:glossiness"`` (α = (1−g)²).
     method : str
-        ``"closed-form"``, ``"half-angle"``, ``"ward"`` or ``"peak"``.
+        ``"closed-form"``, ``"half-angle"``, ``"ward"``, ``"peak"`` or ``"fit"``.
+    metric : str or Metric
+        What ``"fit"`` keeps: ``"unit"`` (the shape of the lobe), ``"energy"`` (the light) or
+        ``"display"`` (the picture on a screen).
+    exposure : float
+        Exposure of the display metric; 1 puts the source's peak at white.
     gamma : float, optional
         γ of GTR on either side, 2 if not given.
 
@@ -126,17 +137,21 @@ def convert(
     array([0.1794, 0.0577])
     """
     sides = endpoint(source, gamma), endpoint(target, gamma)
-    rule = find_method(method)
+    rule, measure = find_method(method), find_metric(metric, exposure)
     if isinstance(values, tuple):
         _check_pair(values, *sides)
-        return tuple(convert(axis, *sides, rule.name) for axis in values)
+        return tuple(convert(axis, *sides, rule.name, metric=measure) for axis in values)
     operand = as_operand(values)
     parameter = sides[0].decode(operand)
-    result = sides[1].encode(_apply(rule, parameter, *sides))
+    result = sides[1].encode(_apply(rule, measure, parameter, *sides))
     if isinstance(operand, float):
         return float(result)
     dtype = operand.dtype if operand.dtype.kind == "f" else np.dtype(np.float64)
-    return result.astype(dtype)[()]
+    with np.errstate(over="ignore"):
+        cast = result.astype(dtype)
+    if not np.isfinite(cast).all():
+        raise MdfconvError(f"a result is too large for {dtype.name}: convert in float64")
+    return cast[()]
 
 
 def explain(
@@ -145,6 +160,8 @@ def explain(
     target: str | Endpoint,
     method: str = DEFAULT_METHOD,
     *,
+    metric: str | Metric = "unit",
+    exposure: float = 1.0,
     gamma: float | None = None,
     errors: bool = True,
 ) -> list[Conversion]:
@@ -154,7 +171,7 @@ def explain(
     ----------
     values : number, tuple of two numbers, list of either, or numpy.ndarray
         Parameters of the source; a tuple (x, y) is the pair of an anisotropic surface.
-    source, target, method, gamma
+    source, target, method, metric, exposure, gamma
         As for `convert`.
     errors : bool
         False saves the cost of `rmse` and `max_error`, which are then NaN.
@@ -170,63 +187,60 @@ def explain(
         As `convert`.
     """
     sides = endpoint(source, gamma), endpoint(target, gamma)
-    rule = find_method(method)
+    rule, measure = find_method(method), find_metric(metric, exposure)
     items = values if isinstance(values, list) else [values]
     if isinstance(values, np.ndarray):
-        items = values.ravel().tolist()
+        items = as_operand(values).ravel().tolist()
     axes = [item if isinstance(item, tuple) else (item,) for item in items]
     for axis in axes:
         if len(axis) > 1:
             _check_pair(axis, *sides)
-    flat = np.array([value for axis in axes for value in axis], dtype=float)
-    parameter = sides[0].decode(flat)
-    result = _apply(rule, parameter, *sides)
+    parameter = sides[0].decode([value for axis in axes for value in axis])
+    result = _apply(rule, measure, parameter, *sides)
     stored = sides[1].encode(result).tolist()
-    residual = (np.full_like(result, np.nan),) * 2
+    left = (np.full_like(result, np.nan),) * 2
     if errors:
-        residual = unit_residual(sides[0].distribution, parameter, sides[1].distribution, result)
+        left = residual(sides[0].distribution, parameter, sides[1].distribution, result, measure)
     found = []
     start = 0
     for axis in axes:
         rows = slice(start, start + len(axis))
         start += len(axis)
-        found.append(_record(rule, axis, stored[rows], parameter[rows], residual, rows, sides))
+        found.append(
+            Conversion(
+                source=sides[0].label,
+                target=sides[1].label,
+                value=_value([float(entry) for entry in axis]),
+                result=_value(stored[rows]),
+                method=rule.name,
+                metric=measure.name,
+                route=_route(rule, *sides),
+                rmse=float(left[0][rows].max()),
+                max_error=float(left[1][rows].max()),
+                **_remarks(rule, measure, parameter[rows], result[rows], *sides),
+            )
+        )
     return found
 
 
-def _record(
+def _remarks(
     rule: Method,
-    value: tuple[float, ...],
-    result: list[float],
+    measure: Metric,
     parameter: Array,
-    errors: tuple[Array, Array],
-    rows: slice,
-    sides: tuple[Endpoint, Endpoint],
-) -> Conversion:
-    source, target = (side.distribution for side in sides)
-    same = same_family(source, target)
-    cautions = (
-        []
-        if same
-        else [
-            caution
-            for entry in parameter
-            for caution in rule.cautions(float(entry), source, target)
-        ]
-    )
-    keeps = "the same distribution: exact" if same else f"keeps the {rule.keeps}"
-    return Conversion(
-        source=sides[0].label,
-        target=sides[1].label,
-        value=_value([float(entry) for entry in value]),
-        result=_value(result),
-        method=rule.name,
-        route=_route(rule, *sides),
-        rmse=float(errors[0][rows].max()),
-        max_error=float(errors[1][rows].max()),
-        cautions=tuple(dict.fromkeys(cautions)),
-        notes=(*dict.fromkeys(cautions), keeps),
-    )
+    result: Array,
+    source: Endpoint,
+    target: Endpoint,
+) -> dict[str, tuple[str, ...]]:
+    """Return the cautions and notes of one conversion, for `Conversion`."""
+    pair = source.distribution, target.distribution
+    route = ", ".join(_route(rule, source, target))
+    by = (f"by {route}",) if route else ()
+    if same_family(*pair) or rule.is_exact(*pair):
+        return {"cautions": (), "notes": ("exact: the same form", *by)}
+    axes = zip(parameter.tolist(), result.tolist(), strict=True)
+    found = [caution for axis in axes for caution in rule.cautions(*axis, *pair)]
+    cautions = tuple(dict.fromkeys(found))
+    return {"cautions": cautions, "notes": (*cautions, f"keeps the {rule.keeps(measure)}", *by)}
 
 
 def _value(axes: list[float]) -> Value:
@@ -240,18 +254,22 @@ def _route(rule: Method, source: Endpoint, target: Endpoint) -> tuple[str, ...]:
     return tuple(step for step in (steps[0], *middle, steps[1]) if step)
 
 
-def _apply(rule: Method, parameter: Array, source: Endpoint, target: Endpoint) -> Array:
+def _apply(
+    rule: Method, measure: Metric, parameter: Array, source: Endpoint, target: Endpoint
+) -> Array:
     """Convert legal parameters; raise unless every result is legal and can be stored."""
     if same_family(source.distribution, target.distribution):
         result = parameter
     else:
         _check_covered(rule, source, target)
-        with np.errstate(over="ignore"):
-            result = np.asarray(rule.convert(parameter, source.distribution, target.distribution))
+        with np.errstate(all="ignore"):
+            result = np.asarray(
+                rule.convert(parameter, source.distribution, target.distribution, measure)
+            )
     accepted = target.distribution.parameter.accepts(result) & ~np.isnan(target.encode(result))
     if not accepted.all():
         index = int(np.argmin(accepted))
-        raise _unreachable(rule, parameter, result, index, source, target)
+        raise _unreachable(rule, measure, parameter, result, index, source, target)
     return result
 
 
@@ -283,6 +301,7 @@ def _name(side: Endpoint) -> str:
 
 def _unreachable(
     rule: Method,
+    measure: Metric,
     parameter: Array,
     result: Array,
     index: int,
@@ -307,7 +326,9 @@ def _unreachable(
             continue
         one = np.asarray([given])
         with np.errstate(all="ignore"):
-            answer = target.encode(other.convert(one, source.distribution, target.distribution))
+            answer = target.encode(
+                other.convert(one, source.distribution, target.distribution, measure)
+            )
         if target.stored.accepts(answer)[0]:
             answers.append(f"{other.name} answers {number_text(float(answer[0]))}")
     return MdfconvError(

@@ -7,6 +7,7 @@ import numpy as np
 from mdfconv.conversion.formulas import Formula, FormulaMethod
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.parameter import number_text
+from mdfconv.fitting.metrics import Metric
 
 # What the paper's sweep m_B ∈ [0.0044, 0.4473] (its Table 2) covers, in each parameter.
 _SWEEP = {
@@ -82,12 +83,17 @@ class ClosedForm(FormulaMethod):
     """
 
     name = "closed-form"
-    keeps = "shape of the lobe (unit form), approximately"
     source = "Sawicki 2021, eqs (12)-(15), Tables 3 and 4"
 
-    def cautions(self, parameter: float, source: Distribution, target: Distribution) -> list[str]:
+    def keeps(self, metric: Metric) -> str:
+        """Return that the formulas keep the shape, whatever the metric of the errors."""
+        return "shape of the lobe, approximately"
+
+    def cautions(
+        self, parameter: float, result: float, source: Distribution, target: Distribution
+    ) -> list[str]:
         """Add to the turning points whether the source is outside the paper's sweep."""
-        found = super().cautions(parameter, source, target)
+        found = super().cautions(parameter, result, source, target)
         lower, upper = _SWEEP.get(source.name, (0.0, np.inf))
         if not lower <= parameter <= upper:
             found.insert(

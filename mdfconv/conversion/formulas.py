@@ -13,6 +13,7 @@ from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.gtr import GTR
 from mdfconv.distributions.smoothie import from_ggx, to_ggx
+from mdfconv.fitting.metrics import Metric
 
 Function: TypeAlias = Callable[[Array], Array]
 
@@ -67,7 +68,9 @@ class FormulaMethod(Method):
         steps = self._steps(source, target)
         return None if steps is None else tuple(step.text for step in steps)
 
-    def convert(self, parameter: Array, source: Distribution, target: Distribution) -> Array:
+    def convert(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> Array:
         """Apply the formulas one after the other; NaN where one leaves the positive numbers."""
         steps = self._steps(source, target) or []
         for number, step in enumerate(steps):
@@ -76,7 +79,14 @@ class FormulaMethod(Method):
             parameter = step.function(parameter)
         return parameter
 
-    def cautions(self, parameter: float, source: Distribution, target: Distribution) -> list[str]:
+    def is_exact(self, source: Distribution, target: Distribution) -> bool:
+        """Return whether both are one form in two parameters, such as smoothie and ggx."""
+        one_form = _stand(source).name == _stand(target).name
+        return one_form and "schlick" not in (source.name, target.name)
+
+    def cautions(
+        self, parameter: float, result: float, source: Distribution, target: Distribution
+    ) -> list[str]:
         """Say where a formula is used beyond the point at which it turns around."""
         found = []
         value = np.asarray(parameter, dtype=float)
@@ -118,11 +128,6 @@ def _identity(parameter: Array) -> Array:
     return parameter
 
 
-def _quietly(function: Function) -> Function:
-    """Let a formula divide by zero: the infinity is outside every legal range."""
-    return np.errstate(divide="ignore", invalid="ignore")(function)
-
-
 _SCHLICK = Formula("schlick has beckmann's m_B", _identity)
 _STANDS = {
     "schlick": _Stand("beckmann", _SCHLICK, _SCHLICK),
@@ -130,6 +135,6 @@ _STANDS = {
     "smoothie": _Stand(
         "ggx",
         Formula("α = α_s/√(4+α_s²), exact", to_ggx),
-        Formula("α_s = 2α/√(1−α²), exact", _quietly(from_ggx)),
+        Formula("α_s = 2α/√(1−α²), exact", from_ggx),
     ),
 }

@@ -7,27 +7,39 @@ from typing import ClassVar
 
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
+from mdfconv.fitting.metrics import Metric
 
 
 class Method(ABC):
     """A rule that takes the parameter of one distribution to that of another."""
 
     name: ClassVar[str]
-    keeps: ClassVar[str]
     source: ClassVar[str]
+
+    @abstractmethod
+    def keeps(self, metric: Metric) -> str:
+        """Return what the conversion keeps, to follow the word "keeps"."""
 
     @abstractmethod
     def route(self, source: Distribution, target: Distribution) -> tuple[str, ...] | None:
         """Return the steps of the conversion in words; None if the pair is not covered."""
 
     @abstractmethod
-    def convert(self, parameter: Array, source: Distribution, target: Distribution) -> Array:
+    def convert(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> Array:
         """Return target parameters (float64), for a pair that is covered.
 
         Where the rule leaves the target's legal range it returns what it computes; where it
         computes nothing, NaN.
         """
 
-    def cautions(self, parameter: float, source: Distribution, target: Distribution) -> list[str]:
+    def is_exact(self, source: Distribution, target: Distribution) -> bool:
+        """Return whether the target takes the very same form."""
+        return False
+
+    def cautions(
+        self, parameter: float, result: float, source: Distribution, target: Distribution
+    ) -> list[str]:
         """Return what a careful user must know about one conversion, beyond its error."""
         return []

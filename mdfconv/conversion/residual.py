@@ -6,6 +6,7 @@ import numpy as np
 
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
+from mdfconv.fitting.metrics import Metric
 
 # The number of samples behind the paper's Table 2.
 _SAMPLES = 3001
@@ -14,10 +15,14 @@ _HALF_WIDTHS = 4.8
 _ROWS_AT_ONCE = 256
 
 
-def unit_residual(
-    source: Distribution, parameter: Array, target: Distribution, result: Array
+def residual(
+    source: Distribution,
+    parameter: Array,
+    target: Distribution,
+    result: Array,
+    metric: Metric,
 ) -> tuple[Array, Array]:
-    """Compare unit forms on β from 0 to 4.8 β_half of the source, at most π/2.
+    """Compare under a metric on β from 0 to 4.8 β_half of the source, at most π/2.
 
     Parameters
     ----------
@@ -25,16 +30,18 @@ def unit_residual(
         The distributions.
     parameter, result : numpy.ndarray, shape (n,)
         Their parameters.
+    metric : Metric
+        Its signal is compared: D̄, D over the source's maximum, or its encoding for a screen.
 
     Returns
     -------
     rmse, max_error : numpy.ndarray, shape (n,)
-        Root mean square and maximum of |D̄_target − D̄_source| over 3001 uniform angles.
+        Root mean square and maximum of the difference over 3001 uniform angles.
     """
     reach = _HALF_WIDTHS * source.half_width(parameter)
     reach = np.where(reach <= np.pi / 2, reach, np.pi / 2)
     errors = [
-        _compare(source, parameter[rows], target, result[rows], reach[rows])
+        _compare(source, parameter[rows], target, result[rows], reach[rows], metric)
         for rows in _blocks(parameter.size)
     ]
     rmse, maximum = np.concatenate([np.zeros((2, 0)), *errors], axis=1)
@@ -42,10 +49,20 @@ def unit_residual(
 
 
 def _compare(
-    source: Distribution, parameter: Array, target: Distribution, result: Array, reach: Array
+    source: Distribution,
+    parameter: Array,
+    target: Distribution,
+    result: Array,
+    reach: Array,
+    metric: Metric,
 ) -> Array:
     beta = reach[:, None] * np.linspace(0, 1, _SAMPLES)
-    difference = target.unit(beta, result[:, None]) - source.unit(beta, parameter[:, None])
+    peak = source.maximum(parameter[:, None], normalized=metric.normalized)
+    signals = []
+    for distribution, values in ((source, parameter[:, None]), (target, result[:, None])):
+        scale = distribution.maximum(values, normalized=metric.normalized) / peak
+        signals.append(metric.signal(distribution.unit(beta, values) * scale))
+    difference = signals[1] - signals[0]
     rmse = np.sqrt(np.mean(np.square(difference), axis=1))
     return np.stack([rmse, np.max(np.abs(difference), axis=1)])
 

@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from mdfconv.conversion.formulas import Formula, FormulaMethod
+from mdfconv.fitting.metrics import Metric
 
 
 class Ward(FormulaMethod):
     """m_B² N = 2: the rule of thumb of Ward 1996, eq. (11) in Sawicki 2021."""
 
     name = "ward"
-    keeps = "shape of a smooth lobe, roughly"
     source = "Ward 1996; Sawicki 2021, eq. (11)"
+
+    def keeps(self, metric: Metric) -> str:
+        """Return the rule keeps roughly the shape."""
+        return "shape of a smooth lobe, roughly"
 
 
 METHOD = Ward(

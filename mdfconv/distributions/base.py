@@ -32,6 +32,9 @@ class Distribution(ABC):
     source: ClassVar[str]
     parameter: ClassVar[Parameter]
     encodings: ClassVar[tuple[Encoding, ...]] = ()
+    # Arithmetic operations to evaluate the unit form from cos β, the parameter's constants
+    # precomputed; a transcendental function counts as 10.
+    operations: ClassVar[int]
 
     def unit(self, beta: ArrayLike, parameter: Any, *, phi: ArrayLike | None = None) -> Any:
         """Evaluate the unit form D̄ = D / max D.
@@ -109,9 +112,70 @@ class Distribution(ABC):
     def _at_normal(self, parameter: Array) -> Array:
         """Kernel of D(0) of the normalized form, 1/sr."""
 
+    @abstractmethod
+    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        """Kernel of D(β)/D(0) and of ∂ ln(D(β)/D(0)) / ∂ ln p, p the parameter."""
+
+    @abstractmethod
+    def _log_slope_at_normal(self, parameter: Array) -> Array:
+        """Kernel of ∂ ln D(0) / ∂ ln p of the normalized form."""
+
     def _off_axis_maximum(self, parameter: Array) -> Array | None:
         """Kernel of max D / D(0); None where that is 1 for every parameter given."""
         return None
+
+    def _log_slope_off_axis(self, parameter: Array) -> Array:
+        """Kernel of ∂ ln(max D / D(0)) / ∂ ln p."""
+        return np.zeros_like(parameter)
+
+    def mode(self, parameter: Array) -> Array:
+        """Return the angle at which D is largest, radians; 0 unless a subclass says otherwise."""
+        return np.zeros_like(parameter)
+
+    def edge(self, parameter: Array) -> Array | None:
+        """Return the angle beyond which D is 0, radians; None if there is none."""
+        return None
+
+    def with_slope(self, beta: Array, parameter: Array, *, normalized: bool) -> tuple[Array, Array]:
+        """Return D and ∂D/∂(ln p), for fits.
+
+        Parameters
+        ----------
+        beta : numpy.ndarray, shape (n, k)
+            Angles in [0, π/2], radians.
+        parameter : numpy.ndarray, shape (n, 1)
+            Legal parameters p.
+        normalized : bool
+            Whether D is the normalized form (1/sr) or the unit form.
+        """
+        value, slope = self._lobe_and_log_slope(beta, parameter)
+        if normalized:
+            value *= self._at_normal(parameter)
+            slope += self._log_slope_at_normal(parameter)
+        else:
+            maximum = self._off_axis_maximum(parameter)
+            if maximum is not None:
+                value /= maximum
+                slope -= self._log_slope_off_axis(parameter)
+        slope *= value
+        return value, slope
+
+    def shape(self, beta: Array, parameter: Array) -> Array:
+        """Return the unit form of unchecked arrays that broadcast, for fits.
+
+        As `unit` without its checks and its blocks, which only pay for large arrays; `beta`
+        has the shape of the result.
+        """
+        value = self._lobe(beta, parameter)
+        maximum = self._off_axis_maximum(parameter)
+        return value if maximum is None else np.divide(value, maximum, out=value)
+
+    def maximum(self, parameter: Array, *, normalized: bool) -> Array:
+        """Return max D: 1 for the unit form, in 1/sr for the normalized one."""
+        if not normalized:
+            return np.ones_like(parameter)
+        ratio = self._off_axis_maximum(parameter)
+        return self._at_normal(parameter) * (1 if ratio is None else ratio)
 
     def _unit(self, beta: Array, parameter: Array, out: Array) -> None:
         self._lobe(beta, parameter, out)
@@ -220,5 +284,7 @@ def find_root(function: Kernel, bracket: tuple[float, float], argument: Array) -
 
     lower, upper = (np.full(argument.shape, end) for end in bracket)
     found = elementwise.find_root(function, (lower, upper), args=(argument,))
-    root: Array = np.where(found.success, found.x, np.nan)
+    # A function that only approaches 0 towards an end has no root there.
+    crosses = function(lower, argument) * function(upper, argument) < 0
+    root: Array = np.where(found.success & crosses, found.x, np.nan)
     return root

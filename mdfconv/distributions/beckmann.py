@@ -32,6 +32,7 @@ class Beckmann(AnisotropicDistribution):
     normalized_formula = "exp(−tan²β/m²) / (π m² cos⁴β)"
     source = "Beckmann & Spizzichino 1963; Cook & Torrance 1981"
     parameter = Parameter("alpha", "m_B", usual="0 < m_B ≤ 1")
+    operations = 17
     encodings = (ROUGHNESS, GLOSSINESS)
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
@@ -43,10 +44,25 @@ class Beckmann(AnisotropicDistribution):
         _lobe(square, square * -slope_scale(x, y, phi))
 
     def _at_normal(self, parameter: Array) -> Array:
-        return inverse_square(parameter) / np.pi
+        return 1 / (np.pi * parameter * parameter)
 
     def _at_normal_pair(self, x: Array, y: Array) -> Array:
         return 1 / (np.pi * x * y)
+
+    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        square = tangent_square(beta)
+        exponent = square * inverse_square(parameter)
+        return _lobe(square, -exponent), 2 * exponent
+
+    def _log_slope_at_normal(self, parameter: Array) -> Array:
+        return np.full_like(parameter, -2)
+
+    def mode(self, parameter: Array) -> Array:
+        """Return the angle of the maximum: tan²β = 2m² − 1 where m² > ½, else 0."""
+        return np.arctan(np.sqrt(np.maximum(2 * np.square(parameter) - 1, 0)))
+
+    def _log_slope_off_axis(self, parameter: Array) -> Array:
+        return 4 - 2 / np.maximum(np.square(parameter), 0.5)
 
     def _off_axis_maximum(self, parameter: Array) -> Array | None:
         square = np.square(parameter)

@@ -26,6 +26,7 @@ class BlinnPhong(Distribution):
     normalized_formula = "(N+2)/(2π) cos^N β"
     source = "Phong 1975; Blinn 1977; Lewis 1994"
     parameter = Parameter("exponent", "N", usual="N ≥ 1")
+    operations = 20
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         value = tangent_square(beta, out)
@@ -35,6 +36,14 @@ class BlinnPhong(Distribution):
 
     def _at_normal(self, parameter: Array) -> Array:
         return (parameter + 2) / (2 * np.pi)
+
+    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        exponent = np.log1p(tangent_square(beta))
+        exponent *= -0.5 * parameter
+        return np.exp(exponent), exponent
+
+    def _log_slope_at_normal(self, parameter: Array) -> Array:
+        return parameter / (parameter + 2)
 
     def _half_tangent(self, parameter: Array) -> Array:
         return np.sqrt(np.expm1(2 * np.log(2) / parameter))

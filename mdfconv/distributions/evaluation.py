@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from mdfconv.errors import MdfconvError
 
 Array: TypeAlias = NDArray[np.floating[Any]]
+Indices: TypeAlias = NDArray[np.integer[Any]]
 Kernel: TypeAlias = Callable[..., Any]
 
 # Large enough to hide the cost of a call, small enough for the intermediates to stay in cache.
@@ -40,10 +41,14 @@ def as_operand(values: ArrayLike) -> Any:
     MdfconvError
         If the values are not real numbers.
     """
-    if type(values) in (int, float):
-        return float(values)  # type: ignore[arg-type]
+    if isinstance(values, np.ma.MaskedArray):
+        raise MdfconvError("a masked array: fill or compress it first")
     try:
+        if type(values) in (int, float):
+            return float(values)  # type: ignore[arg-type]
         array = np.asarray(values)
+    except OverflowError:
+        raise MdfconvError("a number is too large") from None
     except ValueError:
         raise MdfconvError("expected numbers in an array of a regular shape") from None
     if array.dtype.kind not in "fiu":

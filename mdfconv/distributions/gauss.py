@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from mdfconv.distributions.base import Distribution
@@ -31,6 +33,7 @@ class Gauss(Distribution):
     normalized_formula = "exp(−β²/m²) / (π ∫ exp(−β²/m²) sin 2β dβ)"
     source = "Torrance & Sparrow 1967"
     parameter = Parameter("width", "m_G", usual="0 < m_G ≤ 1")
+    operations = 23
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         value = np.square(beta, out=out)
@@ -39,6 +42,13 @@ class Gauss(Distribution):
 
     def _at_normal(self, parameter: Array) -> Array:
         return 1 / (np.pi * _sine_integral(parameter))
+
+    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        exponent = np.square(beta) * -inverse_square(parameter)
+        return np.exp(exponent), -2 * exponent
+
+    def _log_slope_at_normal(self, parameter: Array) -> Array:
+        return -_sine_integral_slope(parameter) / _sine_integral(parameter)
 
     def _half_tangent(self, parameter: Array) -> Array:
         beta_half = parameter * np.sqrt(np.log(2))
@@ -81,6 +91,24 @@ def _sine_integral(parameter: Array) -> Array:
     faddeeva = wofz(width) + tail * wofz(width + 1j * np.pi / (2 * width))
     integral: Array = (0.5 * np.sqrt(np.pi) * width * faddeeva.imag).astype(parameter.dtype)
     return integral
+
+
+def _sine_integral_slope(parameter: Array) -> Array:
+    """Return the derivative of `_sine_integral` by ln m, from w'(z) = 2i/√π − 2 z w(z)."""
+    from scipy.special import wofz
+
+    def derivative(z: Any, value: Any) -> Any:
+        return 2j / np.sqrt(np.pi) - 2 * z * value
+
+    point = parameter + 1j * np.pi / (2 * parameter)
+    tail = np.exp(-np.square(np.pi / (2 * parameter)))
+    near, far = wofz(parameter), wofz(point)
+    by_m = derivative(parameter, near) + tail * (
+        far * np.pi**2 / (2 * parameter**3)
+        + derivative(point, far) * (1 - 1j * np.pi / (2 * parameter**2))
+    )
+    slope = 0.5 * np.sqrt(np.pi) * np.square(parameter) * by_m.imag
+    return _sine_integral(parameter) + slope
 
 
 DISTRIBUTION = Gauss()

@@ -30,6 +30,7 @@ class GGX(AnisotropicDistribution):
     normalized_formula = "[α² / (α² + (1−α²) sin²β)]² / (π α²)"
     source = "Trowbridge & Reitz 1975; Walter et al. 2007; Burley 2012"
     parameter = Parameter("alpha", "α", upper=1.0, upper_closed=True, usual="0 < α ≤ 1")
+    operations = 5
     encodings = (ROUGHNESS, GLOSSINESS)
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
@@ -39,10 +40,22 @@ class GGX(AnisotropicDistribution):
         trowbridge_reitz(beta, slope_scale(x, y, phi), out)
 
     def _at_normal(self, parameter: Array) -> Array:
-        return inverse_square(parameter) / np.pi
+        return 1 / (np.pi * parameter * parameter)
 
     def _at_normal_pair(self, x: Array, y: Array) -> Array:
         return 1 / (np.pi * x * y)
+
+    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        square = tangent_square(beta)
+        ratio = square * inverse_square(parameter)
+        square += 1
+        fall = 1 + ratio
+        square /= fall
+        ratio /= fall
+        return np.square(square, out=square), 4 * ratio
+
+    def _log_slope_at_normal(self, parameter: Array) -> Array:
+        return np.full_like(parameter, -2)
 
     def _half_tangent(self, parameter: Array) -> Array:
         # t² = e α² / (1 − (1+e) α²), e = √2 − 1: Sawicki 2021, eq. (8), free of its 1 − cos².

@@ -39,6 +39,7 @@ class GTR(Distribution):
     normalized_formula = "k / (1 + (α²−1) cos²β)^γ, k = (γ−1)(α²−1) / (π (1 − α^(2(1−γ))))"
     source = "Burley 2012"
     parameter = Parameter("alpha", "C_TR", upper=1.0, upper_closed=True, usual="0 < C_TR ≤ 1")
+    operations = 24
     exponent = Parameter("gamma", "γ", usual="1.5 ≤ γ ≤ 3")
 
     def __init__(self, gamma: float = 2.0) -> None:
@@ -105,7 +106,20 @@ class GTR(Distribution):
         first = _ratio((1 - alpha) * (1 + alpha), log_square)
         exponent = (gamma - 1) * log_square
         second = _ratio(exponent, -np.expm1(-exponent))
-        return first * second * (inverse_square(alpha) / np.pi)
+        return first * second * (1 / (np.pi * alpha * alpha))
+
+    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        ratio = np.square(np.sin(beta)) * inverse_square(parameter)
+        x = ratio * ((1 - parameter) * (1 + parameter))
+        return np.exp(-self.gamma * np.log1p(x)), 2 * self.gamma * ratio / (1 + x)
+
+    def _log_slope_at_normal(self, parameter: Array) -> Array:
+        log_square = -2 * np.log(parameter)
+        square = np.square(parameter)
+        # Both brackets are differences of poles: their limits as α → 1 and as y → 0.
+        first = np.where(parameter > 1 - 1e-6, 1, 2 / log_square - 2 * square / (1 - square))
+        y = (self.gamma - 1) * log_square
+        return first - 2 * (self.gamma - 1) * _bernoulli(y) - 2
 
     def _half_tangent(self, parameter: Array) -> Array:
         excess = np.expm1(np.log(2) / self.gamma)
@@ -114,6 +128,13 @@ class GTR(Distribution):
     def _from_half_tangent(self, tangent: Array) -> Array:
         excess = np.expm1(np.log(2) / self.gamma)
         return tangent / np.sqrt(excess + (1 + excess) * np.square(tangent))
+
+
+def _bernoulli(y: Array) -> Array:
+    """Return 1/y − 1/(e^y − 1), which is ½ − y/12 near 0."""
+    small = np.abs(y) < 1e-4
+    safe = np.where(small, 1, y)
+    return np.where(small, 0.5 - y / 12, 1 / safe - 1 / np.expm1(safe))
 
 
 def _ratio(numerator: Array, denominator: Array) -> Array:

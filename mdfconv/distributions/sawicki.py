@@ -27,6 +27,7 @@ class Sawicki(Distribution):
     normalized_formula = "96 (3+N) cos β / (π ((1−N) cos β + N + 3)⁴)"
     source = "Sawicki 2006"
     parameter = Parameter("exponent", "N_DS", usual="N_DS ≥ 1")
+    operations = 6
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         value = tangent_square(beta, out)
@@ -43,6 +44,17 @@ class Sawicki(Distribution):
 
     def _at_normal(self, parameter: Array) -> Array:
         return 3 * (3 + parameter) / (8 * np.pi)
+
+    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        square = tangent_square(beta)
+        secant = np.sqrt(1 + square)
+        drop = square / (secant * (1 + secant))
+        fall = 1 + drop * (0.25 * (parameter - 1))
+        value = 1 / (secant * np.square(np.square(fall)))
+        return value, drop * -parameter / fall
+
+    def _log_slope_at_normal(self, parameter: Array) -> Array:
+        return parameter / (parameter + 3)
 
     def _half_tangent(self, parameter: Array) -> Array:
         # ½ (1 + kv)⁴ = 1 − v, k = (N−1)/4: convex and rising in v, so Newton steps from a point

@@ -6,7 +6,7 @@ import numpy as np
 
 from mdfconv.distributions.base import Distribution
 from mdfconv.distributions.double_double import distance_to_cosine
-from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
+from mdfconv.distributions.evaluation import Array, tangent_square
 from mdfconv.distributions.parameter import Parameter
 
 # Where y = x/m is smaller than this, 1 − w is a difference of numbers that agree in too many digits
@@ -31,6 +31,7 @@ class Schlick(Distribution):
     normalized_formula = "m³ x / (π cos β (m x² − x² + m²)²)"
     source = "Schlick 1994, An Inexpensive BRDF Model for Physically-Based Rendering"
     parameter = Parameter("alpha", "m_B", upper=1.0, upper_closed=True, usual="0 < m_B ≤ 1")
+    operations = 8
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         # tan²(β/2)/(1+tan²(β/2)) = ½ (1 − cos β)
@@ -52,7 +53,25 @@ class Schlick(Distribution):
         return y
 
     def _at_normal(self, parameter: Array) -> Array:
-        return inverse_square(parameter) / np.pi
+        return 1 / (np.pi * parameter * parameter)
+
+    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        value = self._lobe(beta, parameter)
+        w = np.minimum(2 * np.square(np.sin(0.5 * beta)) / parameter, 1)
+        y = 1 - w
+        _sharpen_edge(y, beta, parameter)
+        bend = (1 - parameter) / parameter
+        fall = 1 + bend * w * (2 - w)
+        # At and beyond the edge D is 0, and so is its slope.
+        y = np.where(y > 0, y, 1)
+        return value, w / y + 2 * w * ((2 - w) / parameter + 2 * bend * y) / fall
+
+    def _log_slope_at_normal(self, parameter: Array) -> Array:
+        return np.full_like(parameter, -2)
+
+    def edge(self, parameter: Array) -> Array:
+        """Return the end of the support, cos β = 1 − m."""
+        return 2 * np.arcsin(np.sqrt(0.5 * parameter))
 
     def _peak_alpha(self, parameter: Array) -> Array:
         return parameter

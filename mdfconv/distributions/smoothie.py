@@ -27,12 +27,20 @@ class Smoothie(Distribution):
     normalized_formula = "(α²+4)/(π α²) [α² / (α² + 4 sin²β)]²"
     source = "Smoothie: an empirical BRDF (web article)"
     parameter = Parameter("alpha", "α_s", usual="0 < α_s ≤ 1")
+    operations = 6
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         return trowbridge_reitz(beta, 1 + 4 * inverse_square(parameter), out)
 
     def _at_normal(self, parameter: Array) -> Array:
         return (1 + 4 * inverse_square(parameter)) / np.pi
+
+    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        ratio = np.square(np.sin(beta)) * (4 * inverse_square(parameter))
+        return 1 / np.square(1 + ratio), 4 * ratio / (1 + ratio)
+
+    def _log_slope_at_normal(self, parameter: Array) -> Array:
+        return -8 / (4 + np.square(parameter))
 
     def _half_tangent(self, parameter: Array) -> Array:
         square = 0.25 * _EXCESS * np.square(parameter)

@@ -36,7 +36,7 @@ def test_json():
     assert (status, err) == (0, "")
     first, second = json.loads(out)
     assert list(first) == [
-        "from", "to", "value", "result", "method", "rmse", "max_error", "notes",
+        "from", "to", "value", "result", "method", "metric", "rmse", "max_error", "notes",
     ]  # fmt: skip
     assert first["from"] == "blinn-phong"
     assert first["to"] == "ggx:roughness"
@@ -85,6 +85,19 @@ def test_caution_goes_to_standard_error():
     assert (status, out) == (0, "0.67328\n")
     assert err.startswith("mdfconv: note: outside the paper's sweep")
     assert err.count("\n") == 1
+
+
+def test_fit_and_metric():
+    arguments = ("convert", "--from", "blinn-phong", "--to", "ggx:roughness", "--method", "fit")
+    status, out, _ = run(*arguments, "--metric", "energy", 100)
+    assert status == 0
+    assert float(out) == pytest.approx(0.36, abs=1e-4)
+    status, out, _ = run(
+        *arguments, "--metric", "display", "--exposure", 4, "--format", "json", 100
+    )
+    (record,) = json.loads(out)
+    assert record["metric"] == "display"
+    assert record["notes"][0] == "keeps the picture on a screen"
 
 
 def test_gamma():
@@ -136,11 +149,15 @@ def test_table_in_a_pipe_has_no_escapes():
         (("--from", "beckmann", "--to", "ggx", "--method", "wart", "0.2"), "did you mean ward"),
         (("--from", "ggx", "--to", "gtr", "--gamma", "-1", "0.2"), "γ > 0"),
         (("--from", "beckmann", "--to", "ggx", "-"), "holds no values"),
+        (("--from", "beckmann", "--to", "ggx", "-", "-"), "only once"),
+        (("--form", "beckmann", "--to", "ggx", "1"), "no such option: --form"),
+        (("--from", "beckmann", "--to", "ggx", "1", "-f"), "no such option: -f"),
+        (("--from", "beckmann", "--to", "ggx", "1", "--metric", "shape"), "unknown metric"),
         (("--from", "beckmann", "--to", "ggx"), "Missing argument"),
         (("--to", "ggx", "0.2"), "Missing option '--from'"),
         (
             ("--from", "beckmann", "--to", "ggx", "--metod", "ward", "0.2"),
-            "no such option: --metod",
+            "no such option: --metod; did you mean --method?",
         ),
         (("--from", "beckmann", "--to", "ggx", "--format", "xml", "0.2"), "'xml' is not one of"),
     ],
@@ -174,6 +191,26 @@ def test_a_closed_pipe_is_no_error():
     assert source.stderr.read() == b""
     source.stderr.close()
     assert source.wait(timeout=60) == 0
+
+
+def test_broken_streams_are_one_line():
+    arguments = [*COMMAND, "convert", "--from", "beckmann", "--to", "ggx"]
+    for shell in ('"$@" 0.2 >/dev/full', '"$@" 0.2 >&-', '"$@" - <&-'):
+        done = subprocess.run(
+            ["sh", "-c", shell, "sh", *arguments], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 2
+        assert done.stdout == ""
+        assert done.stderr.count("\n") == 1
+
+
+def test_a_narrow_terminal_keeps_the_answer():
+    for columns in ("80", "60"):
+        out = run_on_terminal(
+            "convert", "--from", "ashikhmin-shirley", "--to", "ggx", "100,20", COLUMNS=columns
+        )[1]
+        assert "…" not in out
+        assert "closed-form" in out
 
 
 def test_a_terminal_without_unicode():

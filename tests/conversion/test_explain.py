@@ -30,7 +30,10 @@ def test_errors_are_those_of_the_unit_forms():
 def test_cautions():
     inside, outside, turned = mdfconv.explain([0.4, 0.8, 0.9], "beckmann", "ggx")
     assert inside.cautions == ()
-    assert inside.notes == ("keeps the shape of the lobe (unit form), approximately",)
+    assert inside.notes == (
+        "keeps the shape of the lobe, approximately",
+        "by C = 1.2 m_B − 0.56 m_B³ (Table 4)",
+    )
     assert "outside the paper's sweep" in outside.cautions[0]
     assert len(outside.cautions) == 1
     assert "turns around" in turned.cautions[1]
@@ -52,7 +55,8 @@ def test_routes():
     same = mdfconv.explain(0.25, "ggx", "ggx:roughness", "ward")[0]
     assert same.route == ("α = r²",)
     assert same.max_error == 0
-    assert same.notes == ("the same distribution: exact",)
+    assert same.notes == ("exact: the same form", "by α = r²")
+    assert mdfconv.explain(0.6, "ggx", "smoothie")[0].cautions == ()
 
 
 def test_pairs_report_the_worse_axis():

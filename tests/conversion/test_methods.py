@@ -154,6 +154,19 @@ def test_mistakes_are_named(arguments, words):
         mdfconv.convert(*arguments)
 
 
+def test_awkward_numbers_are_refused_in_words():
+    with pytest.raises(mdfconv.MdfconvError, match="no answer in gauss"):
+        mdfconv.convert(1.0, "ggx", "gauss", method="peak")
+    with pytest.raises(mdfconv.MdfconvError, match="too large for float32"):
+        mdfconv.convert(np.float32(1e-30), "ggx", "blinn-phong")
+    with pytest.raises(mdfconv.MdfconvError, match="masked"):
+        mdfconv.convert(np.ma.array([0.2, 0.3], mask=[0, 1]), "ggx", "blinn-phong")
+    with pytest.raises(mdfconv.MdfconvError, match="too large"):
+        mdfconv.convert(10**400, "blinn-phong", "ggx")
+    with pytest.raises(mdfconv.MdfconvError, match="real numbers"):
+        mdfconv.explain("x", "ggx", "gauss")
+
+
 def test_an_encoding_that_underflows_is_refused():
     with pytest.raises(ValueError, match="0 < α ≤ 1"):
         mdfconv.convert(1e-200, "ggx:roughness", "ggx")

@@ -1,0 +1,230 @@
+"""``mdfconv fit``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mdfconv.cli.output import TableFormat, write_records
+from mdfconv.errors import MdfconvError
+from mdfconv.reports.text import write_file
+
+if TYPE_CHECKING:
+    from mdfconv.distributions import Distribution
+    from mdfconv.measured.lobe_fit import LobeFit
+    from mdfconv.measured.samples import Samples
+
+_COLUMNS = (
+    "distribution", "parameter", "gamma", "stderr", "gamma_stderr", "offset", "scale", "rmse",
+    "log_rmse", "aic", "bic", "simplest",
+)  # fmt: skip
+_BRDF_LIMIT = 80.0  # degrees
+
+
+class Quantity(StrEnum):
+    """What was measured."""
+
+    ndf = "ndf"
+    brdf = "brdf"
+
+
+class Loss(StrEnum):
+    """What a fit minimizes."""
+
+    linear = "linear"
+    log = "log"
+
+
+def command(
+    data: Annotated[Path, typer.Argument(metavar="DATA", help="File of samples.")],
+    targets: Annotated[
+        list[str] | None,
+        typer.Option("--to", metavar="MDF", help="Distribution to fit; repeatable; default all."),
+    ] = None,
+    quantity: Annotated[
+        Quantity | None,
+        typer.Option(help="ndf (default for text), or brdf at θ_d ≈ 0 (default for MERL, ALTA)."),
+    ] = None,
+    angle: Annotated[
+        str, typer.Option(metavar="COLUMN", help="Column of angles, by name or number from 1.")
+    ] = "1",
+    angle_unit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="UNIT", help="degrees, radians or cosine; by default from the header."
+        ),
+    ] = None,
+    values: Annotated[
+        list[str] | None,
+        typer.Option("--values", metavar="COLUMN", help="Column of values; repeatable."),
+    ] = None,
+    max_angle: Annotated[
+        float | None,
+        typer.Option(metavar="DEG", help="Leave out larger angles; 80 by default for brdf."),
+    ] = None,
+    separate: Annotated[
+        bool,
+        typer.Option("--separate", help="Fit every channel on its own, not with one parameter."),
+    ] = False,
+    loss: Annotated[Loss, typer.Option(help="Squared residuals, or those of logarithms.")] = (
+        Loss.linear
+    ),
+    gamma: Annotated[
+        float | None, typer.Option(metavar="G", help="γ of gtr; fitted if not given.")
+    ] = None,
+    tolerance: Annotated[
+        float,
+        typer.Option(metavar="T", help="How much worse than the best the simplest may be."),
+    ] = 0.05,
+    format_: Annotated[
+        TableFormat | None,
+        typer.Option("--format", help="Form of the output: table on a terminal, csv in a pipe."),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write to a file instead.")
+    ] = None,
+    png: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw data, fits and residuals.")
+    ] = None,
+) -> None:
+    """Fit distributions to measured reflectance or to a measured distribution of normals.
+
+    The model is offset + scale · D̄(β). Reads text (CSV, TSV, blanks; an angle and one or more
+    values a row), ALTA's 1-D text format and MERL's .binary. Ranks the fits, best first, and
+    marks the simplest one that is nearly as good.
+
+    Examples:
+
+    mdfconv fit gold.binary
+
+    mdfconv fit lobe.csv --to ggx --to beckmann --png lobe.png
+
+    mdfconv fit scan.txt --angle theta --angle-unit degrees --values red --loss log
+    """
+    from mdfconv.measured.lobe_fit import fit_lobe, rank, simplest
+
+    if not tolerance >= 0:
+        raise MdfconvError("--tolerance is not negative")
+    samples = _read(data, angle, angle_unit, values)
+    samples = _restrict(samples, quantity, max_angle, data)
+    chosen = _targets(targets)
+    results = []
+    for part in _parts(samples) if separate else [samples]:
+        fits = rank([fit_lobe(part, target, loss.value, gamma=gamma) for target in chosen], loss)
+        cheap = simplest(fits, tolerance, loss)
+        results.append((part, fits, cheap))
+    if png:
+        from mdfconv.reports.fit_figure import draw_fits
+
+        write_file(png, draw_fits(results[0][0], results[0][1], data.name))
+    rows = [_record(fit, fit is cheap) for _, fits, cheap in results for fit in fits]
+    columns = list(_COLUMNS)
+    if separate:
+        names = [part.channels[0] for part, fits, _ in results for _ in fits]
+        rows = [{"channel": name} | row for name, row in zip(names, rows, strict=True)]
+        columns.insert(0, "channel")
+    write_records(columns, _shown(rows, format_, output), format_, output, f"Fits to {data.name}")
+    for note in samples.notes:
+        typer.echo(f"mdfconv: note: {note}", err=True)
+    for part, fits, cheap in results:
+        typer.echo(f"mdfconv: {_verdict(part, fits, cheap, tolerance, separate)}", err=True)
+
+
+def _read(path: Path, angle: str, unit: str | None, values: list[str] | None) -> Samples:
+    from mdfconv.measured.merl import read_merl
+    from mdfconv.measured.text import Columns, read_text
+
+    try:
+        if path.suffix.lower() == ".binary":
+            return read_merl(path)
+        return read_text(path, Columns(angle, unit, tuple(values or ())))
+    except OSError as error:
+        raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
+
+
+def _restrict(
+    samples: Samples, quantity: Quantity | None, max_angle: float | None, path: Path
+) -> Samples:
+    """Set the quantity, leave out angles beyond the limit, and say what the model leaves out."""
+    import numpy as np
+
+    kind = quantity.value if quantity else samples.quantity
+    limit = max_angle if max_angle is not None else (_BRDF_LIMIT if kind == "brdf" else 90.0)
+    if not 0 < limit <= 90:
+        raise MdfconvError("--max-angle is above 0 and at most 90 degrees")
+    keep = samples.beta <= np.radians(limit) * (1 + 1e-12)
+    notes = samples.notes
+    if kind == "brdf":
+        notes = (*notes, "brdf: the lobe is D̄/cos²β at θ_d = 0; masking is left out")
+    if not keep.all():
+        count = int(np.count_nonzero(~keep))
+        notes = (*notes, f"{count} of {keep.size} samples beyond {limit:g}° are left out")
+    if not keep.any():
+        raise MdfconvError(f"{path}: no samples up to {limit:g}°")
+    return replace(
+        samples, beta=samples.beta[keep], values=samples.values[keep], quantity=kind, notes=notes
+    )
+
+
+def _targets(names: list[str] | None) -> list[Distribution]:
+    from mdfconv.distributions import distribution, list_distributions
+
+    if not names or "all" in [name.lower() for name in names]:
+        # With one parameter ashikhmin-shirley is blinn-phong.
+        return [entry for entry in list_distributions() if entry.name != "ashikhmin-shirley"]
+    return list(dict.fromkeys(distribution(name) for name in names))
+
+
+def _parts(samples: Samples) -> list[Samples]:
+    return [
+        replace(samples, values=samples.values[:, place : place + 1], channels=(name,))
+        for place, name in enumerate(samples.channels)
+    ]
+
+
+def _record(fit: LobeFit, is_simplest: bool) -> dict[str, Any]:
+    free = len(fit.parameters) > 1
+    return {
+        "distribution": fit.distribution.name,
+        "parameter": fit.parameters[0],
+        "gamma": fit.parameters[1] if free else getattr(fit.distribution, "gamma", None),
+        "stderr": fit.errors[0],
+        "gamma_stderr": fit.errors[1] if free else None,
+        "offset": list(fit.offset),
+        "scale": list(fit.scale),
+        "rmse": fit.rmse,
+        "log_rmse": fit.log_rmse,
+        "aic": fit.aic,
+        "bic": fit.bic,
+        "simplest": is_simplest,
+    }
+
+
+def _shown(
+    rows: list[dict[str, Any]], form: TableFormat | None, output: Path | None
+) -> list[dict[str, Any]]:
+    """Return the records for the form: lists and nulls in JSON, text in the others."""
+    if form is TableFormat.json or (form is None and output and output.suffix == ".json"):
+        return rows
+    return [{key: _text(value) for key, value in row.items()} for row in rows]
+
+
+def _text(value: Any) -> Any:
+    if isinstance(value, list):
+        return " ".join(f"{entry:.4g}" for entry in value)
+    return "" if value is None else value
+
+
+def _verdict(
+    part: Samples, fits: list[LobeFit], cheap: LobeFit, tolerance: float, separate: bool
+) -> str:
+    channel = f"channel {part.channels[0]}: " if separate else ""
+    best = fits[0].distribution.name
+    return (
+        f"{channel}best is {best}; simplest within {100 * tolerance:g} % of its error is "
+        f"{cheap.distribution.name}, at {cheap.distribution.operations} operations an evaluation"
+    )

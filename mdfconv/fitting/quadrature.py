@@ -1,0 +1,91 @@
+"""Angles and weights that resolve a lobe of any width and its tail to π/2."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from mdfconv.distributions.evaluation import Array, Indices
+
+_LOBE_PANELS = 48
+_HORIZON_PANELS = 14
+_NARROWEST = 1e-3  # of the half width
+_ORDER = 12
+_SCAN_ORDER = 4
+_SCAN_SAMPLES = 40
+
+
+class Quadrature(Protocol):
+    """Where an integral over β is sampled, for a batch of n problems."""
+
+    def nodes(self, rows: Indices, breaks: Array | None = None) -> tuple[Array, Array]:
+        """Return angles and weights, shape (len(rows), k), with panels that end at breaks."""
+
+    def coarse(self, rows: Indices) -> tuple[Array, Array]:
+        """Return fewer angles and weights, enough to find the neighbourhood of a minimum."""
+
+
+class LobeQuadrature:
+    """Gauss-Legendre panels that grow geometrically from the lobe to π/2.
+
+    Parameters
+    ----------
+    half_width : numpy.ndarray, shape (n,)
+        β_half of the narrowest lobe of each problem, radians.
+    """
+
+    def __init__(self, half_width: Array) -> None:
+        start = _NARROWEST * half_width[:, None]
+        growth = np.linspace(0, 1, _LOBE_PANELS + 1)
+        lobe = start * (0.5 * np.pi / start) ** growth
+        # Powers of cos β with a broken exponent have a singularity at the horizon.
+        horizon = 0.5 * np.pi * (1 - 0.25 ** np.arange(1, _HORIZON_PANELS + 1))
+        rows = half_width.size
+        edges = [np.zeros((rows, 1)), lobe, np.broadcast_to(horizon, (rows, horizon.size))]
+        self._edges = np.sort(np.concatenate(edges, axis=1), axis=1)
+
+    def nodes(self, rows: Indices, breaks: Array | None = None) -> tuple[Array, Array]:
+        """Return angles and weights; `breaks` has shape (len(rows), any number)."""
+        edges = self._edges[rows]
+        if breaks is not None:
+            edges = np.sort(np.concatenate([edges, breaks], axis=1), axis=1)
+        return _panels(edges, _ORDER)
+
+    def coarse(self, rows: Indices) -> tuple[Array, Array]:
+        """Return the panels at a low order."""
+        return _panels(self._edges[rows], _SCAN_ORDER)
+
+
+class UniformSamples:
+    """Equal weights at uniformly spaced angles, as in the paper's Table 2.
+
+    Parameters
+    ----------
+    reach : numpy.ndarray, shape (n,)
+        The largest angle of each problem, radians.
+    count : int
+        The number of samples from 0 to there.
+    """
+
+    def __init__(self, reach: Array, count: int) -> None:
+        self._beta = reach[:, None] * np.linspace(0, 1, count)
+
+    def nodes(self, rows: Indices, breaks: Array | None = None) -> tuple[Array, Array]:
+        """Return the samples; they are what they are, wherever the breaks."""
+        beta = self._beta[rows]
+        return beta, np.ones_like(beta)
+
+    def coarse(self, rows: Indices) -> tuple[Array, Array]:
+        """Return a few of the samples."""
+        beta = self._beta[rows, :: max(1, self._beta.shape[1] // _SCAN_SAMPLES)]
+        return beta, np.ones_like(beta)
+
+
+def _panels(edges: Array, order: int) -> tuple[Array, Array]:
+    """Return Gauss-Legendre nodes and weights on the panels between sorted edges."""
+    x, w = np.polynomial.legendre.leggauss(order)
+    half = 0.5 * np.diff(edges, axis=1)[:, :, None]
+    middle = edges[:, :-1, None] + half
+    rows = edges.shape[0]
+    return (middle + half * x).reshape(rows, -1), (half * w).reshape(rows, -1)

@@ -1,0 +1,1 @@
+"""Distributions fitted to measurements of reflectance or of a distribution of normals."""

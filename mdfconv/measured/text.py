@@ -1,0 +1,146 @@
+"""Text files: CSV, TSV or blanks between columns, and the ALTA library's 1-D format."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+from mdfconv.measured.samples import UNITS, Samples, samples
+
+_HINTS = {
+    "cosine": re.compile(r"cos", re.I),
+    "degrees": re.compile(r"deg|°", re.I),
+    "radians": re.compile(r"rad", re.I),
+}
+_ALTA_INPUTS = {"COS_TH": "cosine", "COS_TH_H": "cosine", "TH": "radians", "TH_H": "radians"}
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Which columns to read: the user's choice, by name or by number from 1.
+
+    Parameters
+    ----------
+    angle : str
+        The column of angles.
+    unit : str or None
+        ``"degrees"``, ``"radians"`` or ``"cosine"``; None to take it from the header.
+    values : tuple of str
+        The columns of values; empty for all others.
+    """
+
+    angle: str = "1"
+    unit: str | None = None
+    values: tuple[str, ...] = ()
+
+
+def read_text(path: Path, columns: Columns) -> Samples:
+    """Read a text file of samples.
+
+    Parameters
+    ----------
+    path : Path
+        The file, UTF-8. Lines that start with # are comments, but for ALTA's header.
+    columns : Columns
+        Which columns hold what.
+
+    Raises
+    ------
+    MdfconvError
+        If the file is not text, has no numbers or not the columns asked for.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise MdfconvError(
+            f"{path}: not UTF-8 text (byte {error.start + 1}); convert its encoding first"
+        ) from None
+    tags = dict(re.findall(r"^#\s*(DIM|PARAM_IN|PARAM_OUT)\s+(.+?)\s*$", "\n".join(lines), re.M))
+    header, table = _table(path, lines)
+    if "DIM" in tags:
+        return _alta(path, tags, table)
+    angle = _column(path, columns.angle, header, table)
+    chosen = [_column(path, name, header, table) for name in columns.values]
+    chosen = chosen or [index for index in range(table.shape[1]) if index != angle]
+    if not chosen:
+        raise MdfconvError(f"{path}: one column is not enough: give an angle and a value")
+    unit = _unit(path, columns.unit, header[angle], table[:, angle])
+    names = tuple(header[index] for index in chosen)
+    return samples(path, table[:, angle], unit, table[:, chosen], names, "ndf")
+
+
+def _table(path: Path, lines: list[str]) -> tuple[list[str], Array]:
+    """Return the names of the columns and the numbers."""
+    rows = [(number, line.strip()) for number, line in enumerate(lines, start=1)]
+    rows = [(number, line) for number, line in rows if line and not line.startswith("#")]
+    header: list[str] = []
+    numbers: list[list[float]] = []
+    for place, (number, line) in enumerate(rows):
+        cells = [cell.strip().strip('"') for cell in _split(line)]
+        try:
+            numbers.append([float(cell) if cell else np.nan for cell in cells])
+        except ValueError:
+            if place:
+                raise MdfconvError(f"{path}, line {number}: not numbers: {line[:60]}") from None
+            header = cells
+    if not numbers:
+        raise MdfconvError(f"{path}: no numeric rows")
+    width = len(header or numbers[0])
+    for (number, _), found in zip(rows[len(rows) - len(numbers) :], numbers, strict=True):
+        if len(found) != width:
+            raise MdfconvError(f"{path}, line {number}: {len(found)} columns where {width} go")
+    return header or [str(index + 1) for index in range(width)], np.array(numbers)
+
+
+def _split(line: str) -> list[str]:
+    for separator in (",", ";", "\t"):
+        if separator in line:
+            return line.split(separator)
+    return line.split()
+
+
+def _column(path: Path, name: str, header: list[str], table: Array) -> int:
+    lowered = [entry.lower() for entry in header]
+    if name.lower() in lowered:
+        return lowered.index(name.lower())
+    if name.isdigit() and 1 <= int(name) <= table.shape[1]:
+        return int(name) - 1
+    raise MdfconvError(f"{path}: no column '{name}'; there are {', '.join(header)}")
+
+
+def _unit(path: Path, wanted: str | None, name: str, angle: Array) -> str:
+    if wanted:
+        if wanted not in UNITS:
+            raise MdfconvError(f"unknown angle unit '{wanted}'; known: {', '.join(UNITS)}")
+        return wanted
+    for unit, hint in _HINTS.items():
+        if hint.search(name):
+            return unit
+    if np.nanmax(angle) > np.pi / 2 * (1 + 1e-6):
+        return "degrees"
+    raise MdfconvError(
+        f"{path}: column '{name}' does not say whether it holds degrees, radians or cosines; "
+        "give --angle-unit"
+    )
+
+
+def _alta(path: Path, tags: dict[str, str], table: Array) -> Samples:
+    """Interpret ALTA's header: one input dimension, any number of outputs."""
+    dimensions = tags["DIM"].split()
+    given = tags.get("PARAM_IN", "").strip().upper()
+    if len(dimensions) < 2 or dimensions[0] != "1" or not dimensions[1].isdigit():
+        raise MdfconvError(f"{path}: ALTA data of dimension '{tags['DIM']}'; only 1 N is read")
+    outputs = int(dimensions[1])
+    if given not in _ALTA_INPUTS:
+        raise MdfconvError(
+            f"{path}: ALTA input parametrization '{given}'; known: {', '.join(_ALTA_INPUTS)}"
+        )
+    if not 1 <= outputs < table.shape[1]:
+        raise MdfconvError(f"{path}: {table.shape[1]} columns do not hold 1 + {outputs} dimensions")
+    names = ("R", "G", "B") if outputs == 3 else tuple(str(n + 1) for n in range(outputs))
+    return samples(path, table[:, 0], _ALTA_INPUTS[given], table[:, 1 : 1 + outputs], names, "brdf")

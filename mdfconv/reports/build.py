@@ -1,0 +1,180 @@
+"""The report folder: every table and figure of the project, and the index to them.
+
+A new artefact is a function that returns an `Artefact`, and one entry in `_ARTEFACTS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import list_metrics, metric
+from mdfconv.reports.closed_forms import refit
+from mdfconv.reports.table2 import COLUMNS, compare, fit_table, paper_sweep
+from mdfconv.reports.text import csv_text, markdown_text, write_file
+
+Files = dict[str, bytes]
+
+
+@dataclass(frozen=True)
+class Artefact:
+    """Files of the report, and what the index says of them.
+
+    Parameters
+    ----------
+    files : dict
+        From file names to contents.
+    reproduces : str
+        Which table or figure of which source, or what question is answered.
+    agreement : str
+        How well, in figures.
+    command : str
+        The command that makes it.
+    """
+
+    files: Files
+    reproduces: str
+    agreement: str
+    command: str
+
+
+def _text(text: str) -> bytes:
+    return f"{text}\n".encode()
+
+
+def table2() -> Artefact:
+    """Return Table 2 and the comparison with the printed one."""
+    rows = fit_table(*paper_sweep(), metric("unit"))
+    cells = [asdict(cell) for cell in compare()]
+    agreeing = sum(cell["agrees"] for cell in cells)
+    columns = list(cells[0])
+    page = "\n".join(
+        [
+            "# Table 2 of Sawicki 2021, recomputed",
+            "",
+            "Beckmann fitted by the others, least squares on unit forms; root mean square errors "
+            "beside the parameters. `n_eq11` is N by m_B² N = 2.",
+            "",
+            markdown_text(COLUMNS, rows),
+            "",
+            f"## The {len(cells) - agreeing} printed cells that do not come back",
+            "",
+            "`units`: our difference in units of the last printed digit.",
+            "",
+            markdown_text(columns, [cell for cell in cells if not cell["agrees"]]),
+        ]
+    )
+    return Artefact(
+        {"table2.csv": _text(csv_text(COLUMNS, rows)), "table2.md": _text(page)},
+        "Sawicki 2021, Table 2",
+        f"{agreeing} of {len(cells)} cells within 4e-4 relative; the others are explained",
+        "mdfconv fit-table --compare",
+    )
+
+
+def other_metrics() -> Artefact:
+    """Return the table for the metrics that the paper does not have."""
+    files: Files = {}
+    for name in list_metrics()[1:]:
+        rows = fit_table(*paper_sweep(), metric(name))
+        files[f"table2-{name}.csv"] = _text(csv_text(COLUMNS, rows))
+        page = f"# Table 2 under the {name} metric\n\n{markdown_text(COLUMNS, rows)}"
+        files[f"table2-{name}.md"] = _text(page)
+    return Artefact(
+        files,
+        "Table 2 for those who keep the light (energy) or the picture (display, exposure 1)",
+        "no printed counterpart",
+        "mdfconv fit-table --metric energy",
+    )
+
+
+def closed_forms() -> Artefact:
+    """Return the paper's coefficients beside refitted ones."""
+    rows = [
+        {
+            "from": found.form.source,
+            "to": found.form.target,
+            "formula": found.form.text,
+            "metric": found.metric,
+            "printed": " ".join(f"{value:.6g}" for value in found.form.printed),
+            "worst_printed": f"{found.printed_error:.4g}",
+            "refitted": " ".join(f"{value:.6g}" for value in found.coefficients),
+            "worst_refitted": f"{found.error:.4g}",
+        }
+        for name in list_metrics()
+        for found in refit(metric(name))
+    ]
+    columns = list(rows[0])
+    unit = [row for row in rows if row["metric"] == "unit"]
+    worst = max(float(row["worst_printed"]) for row in unit)
+    page = "\n".join(
+        [
+            "# The closed forms of Sawicki 2021, refitted",
+            "",
+            "Coefficients a, b of the printed shapes, and the worst relative error of each over "
+            "the 17 rows of Table 2 under every metric. The printed ones were fitted to unit "
+            "forms; where the light or the picture is to be kept, the refitted ones are right.",
+            "",
+            markdown_text(columns, rows),
+        ]
+    )
+    return Artefact(
+        {"closed-forms.csv": _text(csv_text(columns, rows)), "closed-forms.md": _text(page)},
+        "Sawicki 2021, equations (12)-(15), Tables 3 and 4",
+        f"the printed coefficients are within {100 * worst:.2g} % of the unit table",
+        "mdfconv fit-table --closed-forms",
+    )
+
+
+_ARTEFACTS: tuple[Callable[[], Artefact], ...] = (table2, other_metrics, closed_forms)
+COUNT = len(_ARTEFACTS)
+
+
+def build(folder: Path) -> Iterator[Artefact]:
+    """Write the report into a folder, yielding each artefact as it is written.
+
+    Parameters
+    ----------
+    folder : Path
+        Created if its parent exists.
+
+    Raises
+    ------
+    MdfconvError
+        If the folder cannot be written.
+    """
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise MdfconvError(f"cannot create {folder}: {error.strerror}") from None
+    done = []
+    for make in _ARTEFACTS:
+        artefact = make()
+        for name, content in artefact.files.items():
+            write_file(folder / name, content)
+        done.append(artefact)
+        yield artefact
+    write_file(folder / "README.md", _text(_index(done)))
+
+
+def _index(artefacts: list[Artefact]) -> str:
+    rows = [
+        {
+            "files": ", ".join(f"[{name}]({name})" for name in artefact.files),
+            "reproduces": artefact.reproduces,
+            "agreement": artefact.agreement,
+            "command": f"`{artefact.command}`",
+        }
+        for artefact in artefacts
+    ]
+    return "\n".join(
+        [
+            "# Report",
+            "",
+            "Everything that mdfconv reproduces or shows, made by `mdfconv report`.",
+            "",
+            markdown_text(["files", "reproduces", "agreement", "command"], rows),
+        ]
+    )

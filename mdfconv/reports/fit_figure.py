@@ -1,0 +1,46 @@
+"""The picture of a fit to measurements: data, fits, and what they leave."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mdfconv.measured.lobe_fit import LobeFit
+from mdfconv.measured.samples import Samples
+from mdfconv.reports.figures import PAGE, encoded, line_style, pyplot
+
+_POINTS = 600
+
+
+def draw_fits(data: Samples, fits: list[LobeFit], title: str) -> bytes:
+    """Return a PNG of samples and fits, with the residuals beneath.
+
+    Parameters
+    ----------
+    data : Samples
+        The measurements; of several channels the first is drawn.
+    fits : list of LobeFit
+        The fits, best first.
+    title : str
+        What was measured.
+    """
+    plt = pyplot()
+    figure, (upper, lower) = plt.subplots(
+        2, 1, figsize=PAGE, sharex=True, height_ratios=(3, 2), layout="constrained"
+    )
+    degrees = np.degrees(data.beta)
+    beta = np.linspace(data.beta[0], data.beta[-1], _POINTS)
+    upper.plot(degrees, data.values[:, 0], "o", color="0.6", markersize=3, label="data")
+    for fit in fits:
+        style = line_style(fit.distribution.name)
+        values = ", ".join(f"{value:.4g}" for value in fit.parameters)
+        label = f"{fit.distribution.name} {fit.distribution.parameter.symbol} = {values}"
+        upper.plot(np.degrees(beta), fit.model(beta, data.quantity)[:, 0], label=label, **style)
+        rest = fit.model(data.beta, data.quantity)[:, 0] - data.values[:, 0]
+        lower.plot(degrees, rest, **style)
+    channel = f", channel {data.channels[0]}" if len(data.channels) > 1 else ""
+    upper.set_title(title + channel)
+    upper.set_ylabel("BRDF [1/sr]" if data.quantity == "brdf" else "distribution")
+    upper.legend(fontsize=8)
+    lower.set_ylabel("fit − data")
+    lower.set_xlabel("β between normal and half vector [degrees]")
+    return encoded(figure)

@@ -1,0 +1,236 @@
+"""Every ordered pair and metric against a brute-force minimizer; limits; boundaries."""
+
+import itertools
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import mdfconv
+from mdfconv.distributions.gtr import GTR
+from mdfconv.fitting.core import fit
+from mdfconv.fitting.gtr import fit_gtr
+from mdfconv.fitting.metrics import Display, Energy, Unit, metric
+from mdfconv.fitting.quadrature import UniformSamples
+from tests import oracles
+from tests.fitting import brute_force
+
+NAMES = list(brute_force.FORMS)
+WIDTHS = np.geomspace(2e-3, 0.95, 12)
+PARAMETERS = {
+    **dict.fromkeys(NAMES, WIDTHS),
+    "blinn-phong": np.geomspace(1.2, 5e5, 12),
+    "sawicki": np.geomspace(1.2, 5e5, 12),
+}
+SCAN = np.geomspace(1 / 400, 12, 260)
+GAMMA = mp.mpf(1.7)
+
+
+def candidates(target, guess):
+    """A dense scan around equal half angle, inside the legal range."""
+    values = guess * SCAN
+    if target in ("blinn-phong", "sawicki"):
+        return np.concatenate([guess * np.geomspace(1e-7, 1 / 401, 60), values])
+    if target not in ("ggx", "schlick"):
+        return values
+    near_one = 1 - np.append(np.geomspace(0.3, 1e-6, 40), 0)
+    return np.unique(np.concatenate([values[values < 0.7], near_one]))
+
+
+@pytest.mark.parametrize("kept", ["unit", "energy", "display"])
+@pytest.mark.parametrize(("source", "target"), list(itertools.permutations(NAMES, 2)))
+def test_pair_against_brute_force(source, target, kept):
+    entry = mdfconv.distribution(source)
+    found = fit(entry, PARAMETERS[source], mdfconv.distribution(target), metric(kept))
+    assert not found.at_limit.any()
+    tolerance = 1e-5 if kept == "display" else 1e-7
+    for parameter, got in zip(PARAMETERS[source], found.parameter, strict=True):
+        width = entry.half_width(parameter)
+        width = 1.0 if np.isnan(width) else width
+        guess = mdfconv.distribution(target).from_half_tangent(np.tan(min(width, 0.9)))
+        exact = brute_force.minimum(
+            kept, source, parameter, target, width, candidates(target, guess)
+        )
+        assert got == pytest.approx(exact, rel=tolerance, nan_ok=True), parameter
+
+
+@pytest.mark.parametrize(
+    ("measure", "ratio"),
+    [
+        (Unit(), 1.199),
+        (Energy(), 0.925),
+        (Display(), 0.647),
+        (Display(0.5), 0.750),
+        (Display(4), 0.556),
+    ],
+)
+def test_limits_for_smooth_surfaces(measure, ratio):
+    smooth = np.array([1e-8, 1e-6, 1e-4])
+    found = fit(mdfconv.distribution("beckmann"), smooth, mdfconv.distribution("ggx"), measure)
+    np.testing.assert_allclose(found.parameter / smooth, ratio, atol=5e-4)
+
+
+def test_best_fits_at_the_end_of_the_range():
+    ggx, schlick, gauss = map(mdfconv.distribution, ("ggx", "schlick", "gauss"))
+    uniform = np.array([0.5, 1.0])
+    closed = fit(ggx, uniform, schlick, Unit())
+    assert closed.at_limit.tolist() == [False, True]
+    assert closed.parameter[1] == 1
+    assert np.isnan(fit(ggx, uniform, gauss, Unit()).parameter).tolist() == [False, True]
+    nearly = fit(ggx, np.array([0.99]), gauss, Unit()).parameter[0]
+    assert 5 < nearly < 10
+
+
+def test_fit_of_itself_is_itself():
+    for name in NAMES:
+        entry = mdfconv.distribution(name)
+        for kept in ("unit", "energy", "display"):
+            found = fit(entry, PARAMETERS[name], entry, metric(kept)).parameter
+            np.testing.assert_allclose(found, PARAMETERS[name], rtol=1e-8)
+
+
+def test_batches_agree_with_single_fits():
+    values = np.geomspace(0.01, 0.9, 40)
+    source, target = mdfconv.distribution("gauss"), mdfconv.distribution("schlick")
+    together = fit(source, values, target, Energy()).parameter
+    alone = [fit(source, values[k : k + 1], target, Energy()).parameter[0] for k in range(0, 40, 3)]
+    np.testing.assert_allclose(together[::3], alone, rtol=1e-9)
+    assert fit(source, np.zeros(0), target, Energy()).parameter.shape == (0,)
+
+
+def test_gtr_with_fixed_gamma():
+    values = np.array([0.05, 0.3])
+    source = mdfconv.distribution("beckmann")
+    as_ggx = fit(source, values, mdfconv.distribution("ggx"), Energy()).parameter
+    np.testing.assert_allclose(fit(source, values, GTR(2), Energy()).parameter, as_ggx, rtol=1e-9)
+    np.testing.assert_allclose(
+        fit(source, values, GTR(2 + 1e-9), Energy()).parameter, as_ggx, rtol=1e-7
+    )
+    back = fit(GTR(3.5), values, GTR(3.5), Display()).parameter
+    np.testing.assert_allclose(back, values, rtol=1e-8)
+
+
+def test_gtr_with_free_gamma():
+    alpha, gamma, distance = fit_gtr(GTR(3), np.array([0.2]), Energy())
+    assert alpha[0] == pytest.approx(0.2, rel=1e-4)
+    assert gamma[0] == pytest.approx(3, rel=1e-4)
+    assert abs(distance[0]) < 1e-12
+    # A Gaussian slope distribution is GTR's limit for γ → ∞.
+    assert fit_gtr(mdfconv.distribution("beckmann"), np.array([0.2]), Unit())[1][0] == (
+        pytest.approx(64)
+    )
+
+
+def test_samples_are_used_as_they_are():
+    reach = np.array([0.8])
+    beta = np.linspace(0, 0.8, 301)
+    found = fit(
+        mdfconv.distribution("beckmann"),
+        np.array([0.2]),
+        mdfconv.distribution("blinn-phong"),
+        Unit(),
+        UniformSamples(reach, 301),
+    )
+    wanted = mdfconv.distribution("beckmann").unit(beta, 0.2)
+
+    def cost(n):
+        return np.sum((mdfconv.distribution("blinn-phong").unit(beta, n) - wanted) ** 2)
+
+    n = found.parameter[0]
+    assert found.distance[0] == pytest.approx(cost(n), rel=1e-9)
+    assert cost(n) < min(cost(n * (1 + 1e-4)), cost(n * (1 - 1e-4)))
+
+
+@pytest.mark.parametrize("normalized", [False, True])
+@pytest.mark.parametrize("name", [*NAMES, "gtr"])
+def test_slopes(name, normalized):
+    """The analytic slope against a difference quotient at 50 digits of precision."""
+    entry = GTR(1.7) if name == "gtr" else mdfconv.distribution(name)
+    values = [1.2, 30.0, 4e4] if name in ("blinn-phong", "sawicki") else [1e-3, 0.3, 0.69, 0.97]
+    for parameter in values:
+        width = entry.half_width(parameter)
+        beta = np.array([[0, 0.3, 1, 2.2]]) * (0.4 if np.isnan(width) else width)
+        beta = np.minimum(beta, 1.5)
+        value, slope = entry.with_slope(beta, np.array([[parameter]]), normalized=normalized)
+        step = mp.mpf(10) ** -20
+        for place, angle in enumerate(beta[0]):
+            if value[0, place] == 0:
+                assert slope[0, place] == 0
+                continue
+            above, below = (
+                oracles.ratio_mp(
+                    name, mp.mpf(angle), mp.mpf(parameter) * mp.exp(sign * step), GAMMA
+                )
+                for sign in (1, -1)
+            )
+            exact = (mp.log(above) - mp.log(below)) / (2 * step)
+            if not normalized and name == "beckmann" and parameter**2 > 0.5:
+                exact -= 4 - 2 / mp.mpf(parameter) ** 2
+            if normalized:
+                exact += slope_at_normal(entry, name, parameter)
+            assert slope[0, place] / value[0, place] == pytest.approx(
+                float(exact), rel=1e-9, abs=1e-9
+            )
+
+
+def slope_at_normal(entry, name, parameter):
+    """∂ ln D(0)/∂ ln p from a difference quotient of the hemisphere's integral."""
+    step = mp.mpf(10) ** -12
+
+    def integral(p):
+        edges = [0, *(mp.mpf(entry_width(entry, parameter)) * 2**k for k in range(-2, 14))]
+        if name == "schlick":
+            edge = mp.acos(1 - p)
+            edges = [e for e in edges if e < edge] + [edge]
+        else:
+            edges = [e for e in edges if e < mp.pi / 2] + [mp.pi / 2]
+        with mp.workdps(30):
+            return mp.quad(lambda b: oracles.ratio_mp(name, b, p, GAMMA) * mp.sin(2 * b), edges)
+
+    above, below = (integral(mp.mpf(parameter) * mp.exp(sign * step)) for sign in (1, -1))
+    return -(mp.log(above) - mp.log(below)) / (2 * step)
+
+
+def entry_width(entry, parameter):
+    width = float(entry.half_width(parameter))
+    return 0.4 if np.isnan(width) else width
+
+
+def test_metrics_are_named():
+    assert metric("Energy").name == "energy"
+    with pytest.raises(ValueError, match="did you mean display"):
+        metric("displai")
+    for exposure in (0, -1, np.nan, np.inf):
+        with pytest.raises(ValueError, match="exposure"):
+            metric("display", exposure)
+
+
+def test_convert_by_fit():
+    convert = mdfconv.convert
+    assert convert(0.2, "beckmann", "ggx", method="fit") == pytest.approx(0.23554, abs=1e-5)
+    energy = convert(100, "blinn-phong", "ggx:roughness", method="fit", metric="energy")
+    assert energy == pytest.approx(0.36, abs=1e-4)
+    values = np.array([[0.1, 0.2], [0.3, 0.4]])
+    got = convert(values, "beckmann", "ggx", method="fit", metric="display", exposure=4)
+    assert got.shape == (2, 2)
+    assert np.all(np.diff(got.ravel()) > 0)
+    with pytest.raises(ValueError, match="no answer in gauss"):
+        convert(1.0, "ggx", "gauss", method="fit")
+    answer = mdfconv.explain(1.0, "schlick", "ggx", "fit", metric="energy")[0]
+    assert answer.result == 1
+    assert answer.metric == "energy"
+    assert "end of the legal range" in answer.cautions[0]
+
+
+def test_errors_follow_the_metric():
+    rows = {
+        kept: mdfconv.explain(0.2, "beckmann", "ggx", "fit", metric=kept)[0]
+        for kept in ("unit", "energy", "display")
+    }
+    for kept, row in rows.items():
+        others = [
+            mdfconv.explain(0.2, "beckmann", "ggx", other, metric=kept)[0].rmse
+            for other in ("closed-form", "half-angle", "peak")
+        ]
+        # The metric's weight differs from the uniform one of the error, so not by much.
+        assert row.rmse <= min(others) * 1.1

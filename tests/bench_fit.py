@@ -1,0 +1,84 @@
+"""Times of the fits: run as a script.
+
+Prints the 17 × 4 table against a loop of scipy.optimize.curve_fit on the same samples, and the
+reading and fitting of one MERL-sized file, imports excluded.
+"""
+
+import statistics
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import curve_fit
+
+import mdfconv
+from mdfconv.fitting.core import fit
+from mdfconv.fitting.metrics import Unit
+from mdfconv.fitting.quadrature import UniformSamples
+from mdfconv.measured.lobe_fit import fit_lobe
+from mdfconv.measured.merl import read_merl
+from mdfconv.reports.table2 import FITTED, SAMPLES, paper_sweep
+from tests.fitting.brute_force import FORMS
+
+REPEATS = 15
+
+
+def batched(m_b, reach):
+    """Fit the four columns as the package does."""
+    samples = UniformSamples(reach, SAMPLES)
+    source = mdfconv.distribution("beckmann")
+    for name in FITTED.values():
+        fit(source, m_b, mdfconv.distribution(name), Unit(), samples)
+
+
+def looped(m_b, reach):
+    """Fit the 68 cells one by one, from the start that equation (11) suggests."""
+    for name in FITTED.values():
+        for m, end in zip(m_b, reach, strict=True):
+            beta = np.linspace(0, end, SAMPLES)
+            start = 2 / m**2 if name in ("blinn-phong", "sawicki") else m
+            curve_fit(FORMS[name], beta, FORMS["beckmann"](beta, m), p0=[start])
+
+
+def merl(path):
+    """Write a file of the database's size."""
+    theta = (np.arange(90) / 90) ** 2 * np.pi / 2
+    lobe = mdfconv.distribution("ggx").unit(theta, 0.2) / np.cos(theta) ** 2
+    planes = np.ones((3, 90, 90, 180)) * (1 + 20 * lobe)[:, None, None]
+    with path.open("wb") as file:
+        np.array([90, 90, 180], "<i4").tofile(file)
+        planes.tofile(file)
+
+
+def read_and_fit(path):
+    """Read the file and fit every distribution."""
+    data = read_merl(path)
+    return [fit_lobe(data, entry) for entry in mdfconv.list_distributions()]
+
+
+def seconds(function, *arguments):
+    """Return the time of one call."""
+    start = time.perf_counter()
+    function(*arguments)
+    return time.perf_counter() - start
+
+
+def main():
+    """Print the figures."""
+    sweep = paper_sweep()
+    batched(*sweep)
+    looped(*sweep)
+    times = [(seconds(batched, *sweep), seconds(looped, *sweep)) for _ in range(REPEATS)]
+    ours, theirs = (1e3 * statistics.median(column) for column in zip(*times, strict=True))
+    print(f"table 17 × 4: {ours:.1f} ms, curve_fit loop {theirs:.1f} ms, ratio {theirs / ours:.2f}")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "test.binary"
+        merl(path)
+        read_and_fit(path)
+        once = statistics.median(seconds(read_and_fit, path) for _ in range(5))
+    print(f"MERL file read and fitted to all: {once:.2f} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -23,6 +23,8 @@ _COMMANDS = (
     "list",
     "fit",
     "fit-table",
+    "plot-error",
+    "compare",
     "report",
 )
 
@@ -36,7 +38,9 @@ class _Command(TyperCommand):
     """A command that takes negative numbers for values and other unknown options for mistakes."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
-        known = [name for entry in self.get_params(ctx) for name in entry.opts]
+        known = [
+            name for entry in self.get_params(ctx) for name in (*entry.opts, *entry.secondary_opts)
+        ]
         for word in args[: args.index("--")] if "--" in args else args:
             name = word.partition("=")[0]
             if len(word) > 1 and word[0] == "-" and name not in known and not _is_number(word):

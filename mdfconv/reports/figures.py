@@ -14,8 +14,8 @@ from typing import Any
 PAGE = (7.2, 5.4)  # inches
 _DASHES: dict[str, tuple[str, Any]] = {
     "beckmann": ("#000000", "-"),
-    "gauss": ("#56B4E9", (0, (6, 2))),
-    "ggx": ("#D55E00", "-"),
+    "gauss": ("#56B4E9", (0, (4, 4))),
+    "ggx": ("#D55E00", (0, (10, 1.5))),
     "gtr": ("#D55E00", (0, (1, 1))),
     "blinn-phong": ("#0072B2", (0, (4, 2, 1, 2))),
     "schlick": ("#009E73", (0, (2, 2))),

@@ -37,6 +37,15 @@ def cell_text(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
+def rounded_rows(columns: Mapping[str, Any]) -> list[dict[str, float]]:
+    """Return arrays of one length as rows, to nine digits: what a curve's file needs."""
+    table = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [
+        {name: float(f"{value:.9g}") for name, value in zip(columns, row, strict=True)}
+        for row in table
+    ]
+
+
 def markdown_text(columns: Sequence[str], rows: Sequence[Record]) -> str:
     """Return rows as a Markdown table, numbers as `cell_text` writes them."""
     lines = [columns, ["---"] * len(columns)]

@@ -18,7 +18,9 @@ def test_version_and_help():
     assert run()[:2] == (status, out)
 
 
-@pytest.mark.parametrize("command", ["convert", "list", "fit", "fit-table", "report"])
+@pytest.mark.parametrize(
+    "command", ["convert", "list", "fit", "fit-table", "report", "plot-error", "compare"]
+)
 def test_every_command_has_help_with_examples(command):
     status, out, _ = run(command, "--help")
     assert status == 0

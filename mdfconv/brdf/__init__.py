@@ -1,0 +1,1 @@
+"""What a picture needs around the distribution: Fresnel, masking, and the BRDF itself."""

@@ -1,0 +1,136 @@
+"""``mdfconv compare``."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mdfconv.cli.folder import check_folder, write_all
+from mdfconv.cli.output import TableFormat, write_records
+from mdfconv.errors import MdfconvError
+
+if TYPE_CHECKING:
+    from mdfconv.reports.comparison import Rule
+
+_COLUMNS = (
+    "figure", "conversion", "distribution", "parameter", "rmse_linear", "psnr_linear",
+    "rmse_displayed", "psnr_displayed", "peak_ratio", "energy_ratio",
+)  # fmt: skip
+
+
+class Light(StrEnum):
+    """The lights of the scene."""
+
+    directional = "directional"
+    area = "area"
+
+
+class Brdf(StrEnum):
+    """The BRDFs into which a distribution can be put."""
+
+    ashikhmin_shirley = "ashikhmin-shirley"
+    cook_torrance = "cook-torrance"
+
+
+def command(
+    m_b: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--m-b", metavar="M", help="Beckmann's m_B; repeatable; default 0.4 and 0.04464."
+        ),
+    ] = None,
+    mdf: Annotated[
+        list[str] | None,
+        typer.Option("--mdf", metavar="MDF", help="Distribution to show; repeatable."),
+    ] = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            metavar="METHOD",
+            help="One conversion; by default closed-form (shape), fit energy (light) and fit "
+            "display (picture).",
+        ),
+    ] = None,
+    metric: Annotated[
+        str | None, typer.Option(metavar="METRIC", help="What --method fit keeps.")
+    ] = None,
+    exposure: Annotated[
+        float,
+        typer.Option(metavar="E", help="Exposure: 1 displays the peak of Beckmann as white."),
+    ] = 1.0,
+    light: Annotated[Light, typer.Option(help="A directional light or a square one.")] = (
+        Light.directional
+    ),
+    brdf: Annotated[
+        Brdf, typer.Option(help="The BRDF into which the distribution is put.")
+    ] = Brdf.ashikhmin_shirley,
+    normalized: Annotated[bool, typer.Option("--normalized/--unit", help="The form of D.")] = True,
+    size: Annotated[int, typer.Option(metavar="N", help="Pixels a side of a picture.")] = 256,
+    dpi: Annotated[int, typer.Option(metavar="N", help="Resolution of the sheet.")] = 120,
+    output: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder to write to; default ./reports.")
+    ] = None,
+    format_: Annotated[
+        TableFormat | None,
+        typer.Option("--format", help="Form of the table that is printed."),
+    ] = None,
+) -> None:
+    """Render a sphere with one distribution put in another's place: Figures 3 to 5.
+
+    Writes a contact sheet (fig4.png, fig5.png) and the luminance through the highlight (CSV).
+    Prints RMSE and PSNR against Beckmann, in linear light and as displayed, and the ratios of
+    peak and total energy.
+
+    Examples:
+
+    mdfconv compare
+
+    mdfconv compare --m-b 0.2 --mdf ggx --light area --exposure 4
+
+    mdfconv compare --m-b 0.1 --method fit --metric display --brdf cook-torrance --size 512
+    """
+    from mdfconv.reports.comparison import SUBSTITUTES, Scene, compare
+    from mdfconv.reports.comparison_figure import draw_comparison
+    from mdfconv.reports.text import csv_text
+
+    if not 1 <= dpi <= 2400:
+        raise MdfconvError("--dpi is from 1 to 2400")
+    rules = _rules(method, metric, exposure)
+    names = _names(mdf) or SUBSTITUTES
+    folder = check_folder(output)
+    scene = Scene(brdf.value, light.value, normalized, exposure, size)
+    figures = {f"compare-m_b-{value:g}": value for value in m_b or ()}
+    rows: list[dict[str, Any]] = []
+    contents: dict[str, bytes] = {}
+    for name, value in (figures or {"fig4": 0.4, "fig5": 0.04464}).items():
+        found = compare(value, rules, scene, names)
+        rows += [{"figure": name} | row for row in found.table()]
+        columns, section = found.section_rows()
+        contents[f"{name}.csv"] = f"{csv_text(columns, section)}\n".encode()
+        contents[f"{name}.png"] = draw_comparison(found, dpi)
+    paths = write_all(folder, contents)
+    write_records(_COLUMNS, rows, format_, None, "Pictures against Beckmann's")
+    for path in paths:
+        typer.echo(f"mdfconv: wrote {path}", err=True)
+
+
+def _rules(method: str | None, metric: str | None, exposure: float) -> list[Rule]:
+    from mdfconv.conversion import find_method
+    from mdfconv.fitting.metrics import metric as find_metric
+    from mdfconv.reports.comparison import Rule, default_rules
+
+    if method is None and metric is None:
+        return default_rules(exposure)
+    return [Rule(find_method(method or "fit").name, find_metric(metric or "unit", exposure))]
+
+
+def _names(mdf: list[str] | None) -> list[str]:
+    from mdfconv.distributions import distribution
+
+    names = list(dict.fromkeys(distribution(name).name for name in mdf or ()))
+    if "ashikhmin-shirley" in names:
+        raise MdfconvError("with one parameter ashikhmin-shirley is blinn-phong: show that")
+    return names

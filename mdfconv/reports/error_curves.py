@@ -1,0 +1,122 @@
+"""Curves of distributions and of their error against one of them: Figures 1 and 2."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mdfconv.conversion import convert
+from mdfconv.distributions import distribution
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric
+
+# Sawicki 2021, captions of Figures 1 and 2.
+PAPER_SETS: Mapping[str, Mapping[str, float]] = {
+    "fig1": {
+        "beckmann": 0.4, "blinn-phong": 10, "gauss": 0.4364, "ggx": 0.4456, "sawicki": 12.04,
+        "schlick": 0.4,
+    },
+    "fig2": {
+        "beckmann": 0.04464, "blinn-phong": 1000, "gauss": 0.04471, "ggx": 0.05354,
+        "sawicki": 1174.3, "schlick": 0.04464,
+    },
+}  # fmt: skip
+DRAWN = ("blinn-phong", "gauss", "ggx", "sawicki", "schlick")
+_HALF_WIDTHS = 4.8
+_QUANTITIES = {
+    "unit": "unit form D / max D",
+    "energy": "normalized D / max D of the reference",
+    "display": "normalized D as a screen shows it",
+}
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Distributions against β, and their error.
+
+    Parameters
+    ----------
+    parameters : dict
+        From names to parameters, the reference first.
+    beta : numpy.ndarray, shape (n,)
+        Angles, radians.
+    values : dict
+        From names to the metric's signal: D̄ for the unit metric.
+    quantity : str
+        What the values are, for an axis.
+    errors : dict
+        From names but the reference's to (signal − reference)/max reference.
+    """
+
+    parameters: Mapping[str, float]
+    beta: Array
+    values: Mapping[str, Array]
+    quantity: str
+    errors: Mapping[str, Array]
+
+    @property
+    def reference(self) -> str:
+        """The name of the distribution that the others are compared with."""
+        return next(iter(self.parameters))
+
+    def maxima(self) -> list[dict[str, Any]]:
+        """Return for each distribution the largest |error| and where it occurs."""
+        rows = []
+        for name, error in self.errors.items():
+            place = int(np.argmax(np.abs(error)))
+            rows.append(
+                {
+                    "distribution": name,
+                    "parameter": float(self.parameters[name]),
+                    "max_error_percent": 100 * float(abs(error[place])),
+                    "beta_rad": float(self.beta[place]),
+                }
+            )
+        return rows
+
+
+def parameters_for(
+    m_b: float, names: Sequence[str], method: str, metric: Metric
+) -> dict[str, float]:
+    """Return the parameters of distributions converted from Beckmann's m_B."""
+    return {name: float(convert(m_b, "beckmann", name, method, metric=metric)) for name in names}
+
+
+def curves(parameters: Mapping[str, float], reference: str, metric: Metric, points: int) -> Curves:
+    """Evaluate distributions on a range of β that follows the reference's lobe.
+
+    Parameters
+    ----------
+    parameters : dict
+        From names to parameters; the reference is among them.
+    reference : str
+        The distribution to compare with.
+    metric : Metric
+        Unit compares unit forms, as the paper; others what they compare in a fit.
+    points : int
+        Number of angles, from 0 to 4.8 β_half of the reference, at most π/2.
+    """
+    if points < 2:
+        raise MdfconvError("the number of points is at least 2")
+    entry = distribution(reference)
+    given = np.array([parameters[reference]])
+    reach = _HALF_WIDTHS * float(entry.half_width(given)[0])
+    beta = np.linspace(0, reach if reach < np.pi / 2 else np.pi / 2, points)
+    peak = float(entry.maximum(given, normalized=metric.normalized)[0])
+    values = {}
+    for name in [reference, *(name for name in parameters if name != reference)]:
+        other = distribution(name)
+        height = other.maximum(np.array([parameters[name]]), normalized=metric.normalized)[0]
+        values[name] = metric.signal(other.unit(beta, parameters[name]) * (height / peak))
+    top = values[reference].max()
+    errors = {
+        name: (value - values[reference]) / top
+        for name, value in values.items()
+        if name != reference
+    }
+    shown = {name: parameters[name] for name in values}
+    return Curves(shown, beta, values, _QUANTITIES[metric.name], errors)

@@ -1,0 +1,167 @@
+"""A sphere under a distant light, seen from afar: Figures 3 to 5 of Sawicki 2021.
+
+The viewer looks along −z at the unit sphere, without perspective, so every pixel's normal is
+known and one light direction gives one half vector for the whole picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mdfconv.brdf.reflection import BRDFS
+from mdfconv.distributions import Distribution
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+
+VIEW = np.array([0.0, 0.0, 1.0])
+LIGHT = np.array([-0.5, 0.5, np.sqrt(0.5)])  # 45° off the viewer, from above left
+_AREA_HALF_SIDE = 0.15  # of the distance to the square light
+_AREA_SAMPLES = 8  # a side
+_MARGIN = 1.04  # half the picture, in radii
+
+# Reflectance for normals (n, 3), one direction of light and one of the viewer, 1/sr.
+Reflectance = Callable[[Array, Array, Array], Array]
+
+
+@dataclass(frozen=True)
+class Lights:
+    """Distant light from a set of directions.
+
+    Parameters
+    ----------
+    directions : numpy.ndarray, shape (k, 3)
+        Unit vectors towards the light.
+    irradiance : numpy.ndarray, shape (k,)
+        What each brings to a surface that faces it.
+    """
+
+    directions: Array
+    irradiance: Array
+
+
+def lights(kind: str) -> Lights:
+    """Return the light named ``"directional"`` or ``"area"`` (a square); total irradiance π."""
+    if kind == "directional":
+        return Lights(LIGHT[None, :], np.array([np.pi]))
+    if kind != "area":
+        raise MdfconvError(f"unknown light '{kind}'; known: directional, area")
+    right = np.cross([0.0, 1.0, 0.0], LIGHT)
+    right /= np.linalg.norm(right)
+    up = np.cross(LIGHT, right)
+    steps = _AREA_HALF_SIDE * (2 * (np.arange(_AREA_SAMPLES) + 0.5) / _AREA_SAMPLES - 1)
+    x, y = (grid.ravel()[:, None] for grid in np.meshgrid(steps, steps))
+    toward = LIGHT + x * right + y * up
+    distance = np.linalg.norm(toward, axis=1)
+    # A sample of the square counts by its solid angle: cosine at the light over distance².
+    weight = distance**-3
+    return Lights(toward / distance[:, None], np.pi * weight / weight.sum())
+
+
+def microfacet(
+    distribution: Distribution, parameter: float, brdf: str, *, normalized: bool
+) -> Reflectance:
+    """Return the reflectance of a BRDF with a distribution put in.
+
+    Parameters
+    ----------
+    distribution, parameter
+        The distribution and its parameter.
+    brdf : str
+        ``"ashikhmin-shirley"`` or ``"cook-torrance"``.
+    normalized : bool
+        Which form of D.
+    """
+    if brdf not in BRDFS:
+        raise MdfconvError(f"unknown BRDF '{brdf}'; known: {', '.join(BRDFS)}")
+    density = distribution.normalized if normalized else distribution.unit
+
+    def reflectance(normals: Array, light: Array, view: Array) -> Array:
+        half = (light + view) / np.linalg.norm(light + view)
+        # The angle between unit vectors by the chord: arccos loses its digits near 0.
+        chord = np.linalg.norm(normals - half, axis=1)
+        angle = 2 * np.arcsin(np.minimum(0.5 * chord, 1))
+        cosines = normals @ light, normals @ view, normals @ half
+        return BRDFS[brdf](density(angle, parameter), *cosines, float(half @ light))
+
+    return reflectance
+
+
+def radiance(normals: Array, reflectance: Reflectance, light: Lights) -> Array:
+    """Return the light that surfaces send to the viewer.
+
+    Parameters
+    ----------
+    normals : numpy.ndarray, shape (n, 3)
+        Unit normals; where one turns away from the viewer the result is 0.
+    reflectance : callable
+        The BRDF.
+    light : Lights
+        Where the light comes from.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        Radiance in units of irradiance per steradian.
+    """
+    total = np.zeros(len(normals))
+    seen = normals @ VIEW > 0
+    for direction, irradiance in zip(light.directions, light.irradiance, strict=True):
+        cosine = normals @ direction
+        lit = np.flatnonzero(seen & (cosine > 0))
+        total[lit] += reflectance(normals[lit], direction, VIEW) * cosine[lit] * irradiance
+    return total
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The pixels of a square picture that show the sphere.
+
+    Parameters
+    ----------
+    size : int
+        Pixels a side.
+    """
+
+    size: int
+
+    def normals(self) -> tuple[Array, Array]:
+        """Return the pixels' normals, shape (size², 3), and how far each is covered, 0 to 1."""
+        axis = _MARGIN * (2 * (np.arange(self.size) + 0.5) / self.size - 1)
+        x, y = np.meshgrid(axis, -axis)
+        radius = np.hypot(x, y)
+        pixel = 2 * _MARGIN / self.size
+        coverage = np.clip((1 - radius) / pixel + 0.5, 0, 1)
+        # A pixel that straddles the silhouette shows what lies just inside it.
+        shrink = np.minimum(1, (1 - 0.25 * pixel) / np.maximum(radius, 1e-300))
+        x, y = x * shrink, y * shrink
+        z = np.sqrt(np.maximum(1 - x * x - y * y, 0))
+        return np.stack([x, y, z], axis=-1).reshape(-1, 3), coverage.ravel()
+
+    def render(self, reflectance: Reflectance, light: Lights) -> Array:
+        """Return the picture in linear light, shape (size, size), black around the sphere."""
+        normals, coverage = self.normals()
+        picture = np.zeros(len(normals))
+        inside = np.flatnonzero(coverage)
+        picture[inside] = radiance(normals[inside], reflectance, light) * coverage[inside]
+        return picture.reshape(self.size, self.size)
+
+
+def cross_section(count: int) -> tuple[Array, Array]:
+    """Return positions from −1 to 1 radius along the line through the highlight, and normals.
+
+    The line runs through the centre of the sphere's disc, towards the light.
+    """
+    position = np.linspace(-1, 1, count)[1:-1]
+    across = LIGHT[:2] / np.linalg.norm(LIGHT[:2])
+    z = np.sqrt(1 - position**2)
+    normals = np.column_stack([position[:, None] * across, z])
+    return position, normals
+
+
+def highlight() -> tuple[float, float]:
+    """Return where the highlight lies: the half vector's x and y, in radii."""
+    half = (LIGHT + VIEW) / np.linalg.norm(LIGHT + VIEW)
+    return float(half[0]), float(half[1])

@@ -1,0 +1,225 @@
+"""Curves, pictures and the commands that draw them."""
+
+import csv
+import json
+import os
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import mdfconv
+from mdfconv.fitting.metrics import metric
+from mdfconv.reports.comparison import Scene, compare, default_rules
+from mdfconv.reports.error_curves import PAPER_SETS, curves
+from mdfconv.reports.sphere import (
+    LIGHT,
+    VIEW,
+    Frame,
+    Lights,
+    cross_section,
+    highlight,
+    lights,
+    microfacet,
+    radiance,
+)
+from tests.cli.runner import run
+
+# Largest |error| in per cent, computed independently for the formula sheet.
+MAXIMA = {
+    "fig1": {"blinn-phong": 3.52, "gauss": 4.23, "ggx": 11.5, "sawicki": 6.89, "schlick": 12.4},
+    "fig2": {"blinn-phong": 0.045, "gauss": 0.051, "ggx": 5.82, "sawicki": 3.07, "schlick": 15.3},
+}
+NAMES = ["beckmann", "blinn-phong", "gauss", "ggx", "sawicki", "schlick", "smoothie", "gtr"]
+
+
+@pytest.mark.parametrize("figure", MAXIMA)
+def test_maxima_of_the_papers_figures(figure):
+    found = curves(PAPER_SETS[figure], "beckmann", metric("unit"), 1001)
+    for row in found.maxima():
+        printed = MAXIMA[figure][row["distribution"]]
+        digits = 3 if printed > 0.1 else 2
+        assert float(f"{row['max_error_percent']:.{digits}g}") == printed
+
+
+def test_curves_follow_the_lobe():
+    smooth = curves({"beckmann": 1e-4, "ggx": 1.2e-4}, "beckmann", metric("energy"), 101)
+    assert 3e-4 < smooth.beta[-1] < 5e-4
+    rough = curves({"ggx": 1.0, "beckmann": 1.0}, "ggx", metric("unit"), 101)
+    assert rough.beta[-1] == np.pi / 2
+    assert rough.values["ggx"].max() == 1
+
+
+@pytest.mark.parametrize("brdf", ["ashikhmin-shirley", "cook-torrance"])
+@pytest.mark.parametrize("name", NAMES)
+def test_highlight_has_the_analytic_place_and_height(name, brdf):
+    parameter = 200.0 if name in ("blinn-phong", "sawicki") else 0.1
+    entry = mdfconv.distribution(name)
+    surface = microfacet(entry, parameter, brdf, normalized=True)
+    position, normals = cross_section(20001)
+    light = lights("directional")
+    section = radiance(normals, surface, light)
+    place = int(np.argmax(section))
+    assert position[place] == pytest.approx(np.hypot(*highlight()), abs=2e-3)
+    half = (LIGHT + VIEW) / np.linalg.norm(LIGHT + VIEW)
+    cosine = half @ LIGHT
+    fresnel = 0.04 + 0.96 * (1 - cosine) ** 5
+    # At n = h: f (n·l) with n·l = n·v = h·l, and no masking; the light brings π.
+    peak = np.pi * entry.normalized(0, parameter) * fresnel / (4 * cosine)
+    assert radiance(half[None, :], surface, light)[0] == pytest.approx(peak, rel=1e-12)
+    assert section.max() == pytest.approx(peak, rel=2e-3)
+    picture = Frame(256).render(surface, light)
+    row, column = np.unravel_index(np.argmax(picture), picture.shape)
+    axis = 1.04 * (2 * (np.arange(256) + 0.5) / 256 - 1)
+    assert (axis[column], -axis[row]) == pytest.approx(highlight(), abs=0.02)
+
+
+def test_white_furnace():
+    """A white Lambertian sphere in a white environment is white, through the same loop."""
+    z, weight = np.polynomial.legendre.leggauss(60)
+    phi = 2 * np.pi * (np.arange(120) + 0.5) / 120
+    directions = np.stack(
+        [
+            np.outer(np.sqrt(1 - z**2), np.cos(phi)).ravel(),
+            np.outer(np.sqrt(1 - z**2), np.sin(phi)).ravel(),
+            np.repeat(z, 120),
+        ],
+        axis=1,
+    )
+    environment = Lights(directions, np.repeat(weight, 120) * 2 * np.pi / 120)
+    picture = Frame(24).render(lambda n, light, view: np.full(len(n), 1 / np.pi), environment)
+    coverage = Frame(24).normals()[1].reshape(24, 24)
+    np.testing.assert_allclose(picture, coverage, atol=2e-3)
+    assert picture.max() == pytest.approx(1, abs=2e-3)
+
+
+def test_area_light():
+    square = lights("area")
+    assert square.irradiance.sum() == pytest.approx(np.pi)
+    np.testing.assert_allclose(np.linalg.norm(square.directions, axis=1), 1)
+    surface = microfacet(mdfconv.distribution("ggx"), 0.05, "ashikhmin-shirley", normalized=True)
+    wide, narrow = (
+        radiance(cross_section(401)[1], surface, light) for light in (square, lights("directional"))
+    )
+    assert wide.max() < narrow.max()
+    assert np.count_nonzero(wide > 0.5 * wide.max()) > np.count_nonzero(narrow > 0.5 * narrow.max())
+
+
+def test_silhouette_is_antialiased():
+    coverage = Frame(64).normals()[1]
+    assert coverage.sum() == pytest.approx(np.pi / (2 * 1.04) ** 2 * 64**2, rel=1e-3)
+    assert np.count_nonzero((coverage > 0) & (coverage < 1)) > 100
+
+
+def test_each_fit_wins_where_it_promises_to():
+    for m_b in (0.4, 0.04464):
+        found = compare(m_b, default_rules(1.0), Scene(size=128))
+        rows = found.table()
+        for name in {row["distribution"] for row in rows}:
+            shape, light, picture = (row for row in rows if row["distribution"] == name)
+            assert light["rmse_linear"] == min(r["rmse_linear"] for r in (shape, light, picture))
+            assert picture["rmse_displayed"] == min(
+                r["rmse_displayed"] for r in (shape, light, picture)
+            )
+
+
+def test_unit_form_keeps_the_peak():
+    found = compare(0.1, default_rules(1.0)[:1], Scene(size=64, normalized=False), ["ggx"])
+    section = found.rows["closed-form (shape)"][0].section
+    assert section.max() == pytest.approx(1, abs=2e-3)
+
+
+def test_plot_error(tmp_path):
+    status, out, err = run("plot-error", cwd=tmp_path, HOME="/nonexistent")
+    assert status == 0
+    names = sorted(path.name for path in (tmp_path / "reports").iterdir())
+    assert names == ["fig1.png", "fig1b.csv", "fig2.png", "fig2b.csv"]
+    assert err.count("wrote") == 4
+    rows = list(csv.DictReader((tmp_path / "reports" / "fig1b.csv").read_text().splitlines()))
+    assert list(rows[0]) == ["beta_rad", "blinn-phong", "gauss", "ggx", "sawicki", "schlick"]
+    largest = max(abs(float(row["ggx"])) for row in rows)
+    assert largest == pytest.approx(0.115, abs=5e-4)
+    with Image.open(tmp_path / "reports" / "fig1.png") as picture:
+        assert picture.size[0] > 900
+    table = list(csv.DictReader(out.splitlines()))
+    assert len(table) == 10
+
+
+def test_plot_error_options(tmp_path):
+    status, out, _ = run(
+        "plot-error", "--m-b", 0.1, "--m-b", 0.9, "--method", "fit", "--metric", "energy",
+        "--reference", "ggx", "--mdf", "beckmann", "--mdf", "smoothie", "--no-png", "--svg",
+        "--log", "--points", 51, "--output", tmp_path, "--format", "json",
+    )  # fmt: skip
+    assert status == 0
+    assert len(json.loads(out)) == 4
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == [
+        "error-m_b-0.1.svg", "error-m_b-0.1b.csv", "error-m_b-0.9.svg", "error-m_b-0.9b.csv",
+    ]  # fmt: skip
+    assert len((tmp_path / "error-m_b-0.1b.csv").read_text().splitlines()) == 52
+
+
+def test_compare(tmp_path):
+    status, out, _ = run("compare", "--size", 64, "--dpi", 60, cwd=tmp_path)
+    assert status == 0
+    folder = tmp_path / "reports"
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "fig4.csv", "fig4.png", "fig5.csv", "fig5.png",
+    ]  # fmt: skip
+    rows = list(csv.DictReader(out.splitlines()))
+    assert len(rows) == 30
+    section = list(csv.DictReader((folder / "fig4.csv").read_text().splitlines()))
+    assert list(section[0])[:2] == ["position_radii", "beckmann"]
+    status, out, _ = run(
+        "compare", "--m-b", 0.2, "--mdf", "ggx", "--light", "area", "--brdf", "cook-torrance",
+        "--unit", "--method", "fit", "--metric", "display", "--exposure", 4, "--size", 32,
+        "--output", folder, "--format", "json",
+    )  # fmt: skip
+    assert status == 0
+    (record,) = json.loads(out)
+    assert record["conversion"] == "fit display (picture)"
+    assert (folder / "compare-m_b-0.2.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("plot-error", "--output", "missing"), "not a directory"),
+        (("plot-error", "--mdf", "gx"), "did you mean ggx"),
+        (("plot-error", "--reference", "smoothie"), "give --m-b"),
+        (("plot-error", "--m-b", "-1"), "m_B > 0"),
+        (("plot-error", "--m-b", "0.9"), "half-angle answers"),
+        (("plot-error", "--points", "1"), "at least 2"),
+        (("plot-error", "--dpi", "0"), "--dpi"),
+        (("plot-error", "--mdf", "ashikhmin-shirley"), "blinn-phong"),
+        (("compare", "--output", "missing"), "not a directory"),
+        (("compare", "--size", "0"), "16 to 4096"),
+        (("compare", "--dpi", "-5"), "--dpi"),
+        (("compare", "--exposure", "0"), "exposure"),
+        (("compare", "--m-b", "nan"), "not a finite number"),
+        (("compare", "--light", "sun"), "'sun' is not one of"),
+        (("compare", "--mdf", "gx"), "did you mean ggx"),
+        (("compare", "--method", "wart"), "did you mean ward"),
+    ],
+)
+def test_bad_requests_write_nothing(tmp_path, arguments, words):
+    status, out, err = run(*arguments, cwd=tmp_path)
+    assert (status, out) == (2, "")
+    assert words in err
+    assert err.count("\n") == 1
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+@pytest.mark.parametrize("command", ["plot-error", "compare"])
+def test_an_unwritable_folder(tmp_path, command):
+    blocked = tmp_path / "blocked"
+    blocked.write_text("a file where a folder should be")
+    status, out, err = run(command, "--output", blocked)
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    os.makedirs(tmp_path / "here" / "reports.d")
+    (tmp_path / "here" / "reports").write_text("in the way")
+    status, _, err = run(command, cwd=tmp_path / "here")
+    assert status == 2
+    assert "cannot create" in err

@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from mdfconv import __version__
-from mdfconv.errors import MdfconvError
+from mdfconv.errors import MdfconvError, unknown_name
 
 _COMMANDS = (
     "convert",
@@ -66,7 +66,7 @@ class _LazyGroup(TyperGroup):
 
     def get_command(self, ctx: Any, name: str) -> Any:
         if name not in _COMMANDS:
-            return None
+            raise unknown_name("command", name, list(_COMMANDS))
         module = import_module(f"{__name__}.{name.replace('-', '_')}_command")
         single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
         single.command(name, cls=_Command, context_settings=_CONTEXT)(module.command)

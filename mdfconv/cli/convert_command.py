@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from mdfconv.cli.output import Format, console, value_text
+from mdfconv.cli.output import Format, console, print_table, value_text
 from mdfconv.conversion import DEFAULT_METHOD, Conversion, explain, list_methods
 from mdfconv.conversion.endpoint import endpoint
 from mdfconv.distributions import list_distributions
@@ -122,6 +122,12 @@ def command(
     found, reasons = _convert(numbers, source, targets, rule, errors=form is not Format.plain)
     if reasons and (not every or not found):
         raise reasons[0]
+    if metric != "unit" and method != "fit":
+        typer.echo(
+            f"mdfconv: note: the metric is that of the errors; {method} does not depend on it, "
+            "--method fit does",
+            err=True,
+        )
     for reason in reasons:
         typer.echo(f"mdfconv: left out: {reason}", err=True)
     if form is Format.plain:
@@ -250,7 +256,7 @@ def _write_tables(found: dict[str, list[Conversion]], rule: _Rule) -> None:
     """Write a table a target: the chosen answer, and what the other methods would give."""
     out = console()
     for group in found.values():
-        out.print(_table(group, rule))
+        print_table(_table(group, rule))
         for note in dict.fromkeys(note for entry in group for note in entry.cautions):
             out.print(f"Note: {note}.")
     out.print(
@@ -269,11 +275,11 @@ def _table(group: list[Conversion], rule: _Rule) -> Any:
     table = Table(
         box=box.SIMPLE_HEAD, title=f"{given} → {wanted}", title_style="bold", title_justify="left"
     )
-    table.add_column(given, justify="right", overflow="fold")
-    table.add_column(wanted, justify="right", style="bold", overflow="fold", min_width=12)
-    table.add_column("method", overflow="fold", min_width=11)
+    table.add_column(given, justify="right", no_wrap=True)
+    table.add_column(wanted, justify="right", style="bold", no_wrap=True)
+    table.add_column("method", no_wrap=True)
     for heading in ("RMSE", "max error"):
-        table.add_column(heading, justify="right", overflow="fold", min_width=6)
+        table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("keeps", overflow="fold")
     for entry in group:
         table.add_row(*_cells(entry))

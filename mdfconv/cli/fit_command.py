@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.output import TableFormat, write_records
+from mdfconv.cli.output import TableFormat, default_form, record_text, write_records
 from mdfconv.errors import MdfconvError
-from mdfconv.reports.text import write_file
+from mdfconv.reports.text import write_files
 
 if TYPE_CHECKING:
     from mdfconv.distributions import Distribution
     from mdfconv.measured.lobe_fit import LobeFit
     from mdfconv.measured.samples import Samples
 
-_COLUMNS = (
-    "distribution", "parameter", "gamma", "stderr", "gamma_stderr", "offset", "scale", "rmse",
-    "log_rmse", "aic", "bic", "simplest",
-)  # fmt: skip
 _BRDF_LIMIT = 80.0  # degrees
 
 
@@ -105,33 +101,92 @@ def command(
 
     mdfconv fit scan.txt --angle theta --angle-unit degrees --values red --loss log
     """
-    from mdfconv.measured.lobe_fit import fit_lobe, rank, simplest
-
     if not tolerance >= 0:
         raise MdfconvError("--tolerance is not negative")
+    _check_places(data, output, png)
     samples = _read(data, angle, angle_unit, values)
     samples = _restrict(samples, quantity, max_angle, data)
-    chosen = _targets(targets)
-    results = []
-    for part in _parts(samples) if separate else [samples]:
-        fits = rank([fit_lobe(part, target, loss.value, gamma=gamma) for target in chosen], loss)
-        cheap = simplest(fits, tolerance, loss)
-        results.append((part, fits, cheap))
+    parts = _parts(samples) if separate else [samples]
+    results = [_fit(part, _targets(targets), loss, gamma, tolerance, data) for part in parts]
+    form = format_ or default_form(output)
+    columns, rows = _table(results, form, separate)
+    contents = {}
+    if output:
+        contents[output] = f"{record_text(columns, rows, form)}\n".encode()
     if png:
-        from mdfconv.reports.fit_figure import draw_fits
+        contents[png] = _picture(results[0], data.name, many=samples.values.shape[1] > 1)
+    write_files(contents)
+    if not output:
+        write_records(columns, rows, form, None, f"Fits to {data.name}")
+    _tell(samples, results, tolerance, separate)
 
-        write_file(png, draw_fits(results[0][0], results[0][1], data.name))
-    rows = [_record(fit, fit is cheap) for _, fits, cheap in results for fit in fits]
-    columns = list(_COLUMNS)
-    if separate:
-        names = [part.channels[0] for part, fits, _ in results for _ in fits]
-        rows = [{"channel": name} | row for name, row in zip(names, rows, strict=True)]
-        columns.insert(0, "channel")
-    write_records(columns, _shown(rows, format_, output), format_, output, f"Fits to {data.name}")
-    for note in samples.notes:
+
+@dataclass(frozen=True)
+class _Result:
+    """The fits to one set of samples, best first, and the simplest good one."""
+
+    samples: Samples
+    fits: list[LobeFit]
+    simplest: LobeFit
+
+
+def _check_places(data: Path, *places: Path | None) -> None:
+    """Refuse to write over the measurements."""
+    for place in places:
+        if place and place.exists() and data.exists() and place.samefile(data):
+            raise MdfconvError(f"{place} is the file of samples: write to another one")
+
+
+def _fit(
+    samples: Samples,
+    targets: list[Distribution],
+    loss: Loss,
+    gamma: float | None,
+    tolerance: float,
+    path: Path,
+) -> _Result:
+    from mdfconv.measured.lobe_fit import fit_lobe, rank, simplest
+
+    try:
+        fits = [fit_lobe(samples, target, loss.value, gamma=gamma) for target in targets]
+    except MdfconvError as error:
+        raise MdfconvError(f"{path}: {error}") from None
+    return _Result(samples, rank(fits, loss), simplest(fits, tolerance, loss))
+
+
+def _table(
+    results: list[_Result], form: TableFormat, separate: bool
+) -> tuple[list[str], list[dict[str, Any]]]:
+    rows = []
+    for result in results:
+        channel = {"channel": result.samples.channels[0]} if separate else {}
+        rows += [channel | _record(fit, fit is result.simplest) for fit in result.fits]
+    return list(rows[0]), _shown(rows, form)
+
+
+def _picture(result: _Result, name: str, *, many: bool) -> bytes:
+    from mdfconv.reports.fit_figure import draw_fits
+
+    channel = f", channel {result.samples.channels[0]}" if many else ""
+    return draw_fits(result.samples, result.fits, name + channel)
+
+
+def _tell(samples: Samples, results: list[_Result], tolerance: float, separate: bool) -> None:
+    """Write notes and verdicts to standard error."""
+    notes = list(samples.notes)
+    if any(fit.at_limit for result in results for fit in result.fits):
+        notes.append("γ of gtr is at the end of the range that is searched")
+    for note in notes:
         typer.echo(f"mdfconv: note: {note}", err=True)
-    for part, fits, cheap in results:
-        typer.echo(f"mdfconv: {_verdict(part, fits, cheap, tolerance, separate)}", err=True)
+    for result in results:
+        channel = f"channel {result.samples.channels[0]}: " if separate else ""
+        cheap = result.simplest.distribution
+        typer.echo(
+            f"mdfconv: {channel}best is {result.fits[0].distribution.name}; simplest within "
+            f"{100 * tolerance:g} % of its error is {cheap.name}, at {cheap.operations} "
+            "operations an evaluation",
+            err=True,
+        )
 
 
 def _read(path: Path, angle: str, unit: str | None, values: list[str] | None) -> Samples:
@@ -139,9 +194,11 @@ def _read(path: Path, angle: str, unit: str | None, values: list[str] | None) ->
     from mdfconv.measured.text import Columns, read_text
 
     try:
+        columns = Columns(angle, unit, tuple(values or ()))
         if path.suffix.lower() == ".binary":
+            columns.refuse(path, "a MERL file has no columns")
             return read_merl(path)
-        return read_text(path, Columns(angle, unit, tuple(values or ())))
+        return read_text(path, columns)
     except OSError as error:
         raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
 
@@ -204,27 +261,15 @@ def _record(fit: LobeFit, is_simplest: bool) -> dict[str, Any]:
     }
 
 
-def _shown(
-    rows: list[dict[str, Any]], form: TableFormat | None, output: Path | None
-) -> list[dict[str, Any]]:
+def _shown(rows: list[dict[str, Any]], form: TableFormat) -> list[dict[str, Any]]:
     """Return the records for the form: lists and nulls in JSON, text in the others."""
-    if form is TableFormat.json or (form is None and output and output.suffix == ".json"):
+    if form is TableFormat.json:
         return rows
-    return [{key: _text(value) for key, value in row.items()} for row in rows]
+    digits = "r" if form is TableFormat.csv else ".4g"
+    return [{key: _text(value, digits) for key, value in row.items()} for row in rows]
 
 
-def _text(value: Any) -> Any:
+def _text(value: Any, digits: str) -> Any:
     if isinstance(value, list):
-        return " ".join(f"{entry:.4g}" for entry in value)
+        return " ".join(repr(entry) if digits == "r" else f"{entry:{digits}}" for entry in value)
     return "" if value is None else value
-
-
-def _verdict(
-    part: Samples, fits: list[LobeFit], cheap: LobeFit, tolerance: float, separate: bool
-) -> str:
-    channel = f"channel {part.channels[0]}: " if separate else ""
-    best = fits[0].distribution.name
-    return (
-        f"{channel}best is {best}; simplest within {100 * tolerance:g} % of its error is "
-        f"{cheap.distribution.name}, at {cheap.distribution.operations} operations an evaluation"
-    )

@@ -32,7 +32,11 @@ def command(
     ] = False,
     sweep: Annotated[
         str | None,
-        typer.Option(metavar="LO:HI:COUNT", help="Fit other m_B, spaced logarithmically."),
+        typer.Option(
+            metavar="LO:HI:COUNT",
+            help="Fit other m_B, spaced logarithmically; unit forms on β up to 4 m_B, where the "
+            "paper's rows have limits of their own.",
+        ),
     ] = None,
     m_b: Annotated[
         list[float] | None, typer.Option("--m-b", metavar="M", help="Fit this m_B; repeatable.")

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from mdfconv.errors import MdfconvError
-from mdfconv.reports.text import write_file
+from mdfconv.reports.text import write_files
 
 DEFAULT = Path("reports")
 
@@ -28,14 +28,13 @@ def check_folder(folder: Path | None) -> Path:
         except OSError as error:
             raise MdfconvError(f"cannot create {chosen}: {error.strerror}") from None
     if not chosen.is_dir():
-        raise MdfconvError(f"{chosen} is not a directory")
+        raise MdfconvError(f"{chosen} is not an existing directory")
     if not os.access(chosen, os.W_OK):
         raise MdfconvError(f"cannot write to {chosen}")
     return chosen
 
 
 def write_all(folder: Path, contents: dict[str, bytes]) -> list[Path]:
-    """Write files that are ready, each whole, and return their paths."""
-    for name, content in contents.items():
-        write_file(folder / name, content)
+    """Write files that are ready, all or none, and return their paths."""
+    write_files({folder / name: content for name, content in contents.items()})
     return [folder / name for name in contents]

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
@@ -18,13 +18,14 @@ from mdfconv.reports.text import (
     csv_text,
     json_text,
     markdown_text,
-    write_file,
+    write_files,
 )
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 _PIPE_WIDTH = 160
+_WIDEST = 1000
 
 
 class Format(StrEnum):
@@ -69,25 +70,39 @@ def write_records(
     Without a form it is a table on a terminal and CSV in a pipe; for a file, what its name
     ends in.
     """
-    form = form or _default_form(output)
-    if form is TableFormat.table and output is None:
-        console().print(_rich_table(columns, rows, title))
-        return
+    form = form or default_form(output)
+    if output is not None:
+        write_files({output: f"{record_text(columns, rows, form)}\n".encode()})
+    elif form is TableFormat.table:
+        print_table(_rich_table(columns, rows, title))
+    else:
+        typer.echo(record_text(columns, rows, form))
+
+
+def record_text(columns: Sequence[str], rows: Sequence[Record], form: TableFormat) -> str:
+    """Return rows as text in a form."""
     if form is TableFormat.csv:
-        text = csv_text(columns, rows)
-    elif form is TableFormat.markdown:
-        text = markdown_text(columns, rows)
-    elif form is TableFormat.json:
-        text = json_text([{column: row[column] for column in columns} for row in rows])
-    else:
-        text = _plain_table(columns, rows)
-    if output is None:
-        typer.echo(text)
-    else:
-        write_file(output, f"{text}\n".encode())
+        return csv_text(columns, rows)
+    if form is TableFormat.markdown:
+        return markdown_text(columns, rows)
+    if form is TableFormat.json:
+        return json_text([{column: row[column] for column in columns} for row in rows])
+    return _plain_table(columns, rows)
 
 
-def _default_form(output: Path | None) -> TableFormat:
+def print_table(table: Any) -> None:
+    """Print a Rich table, wider than the terminal rather than with numbers broken."""
+    from rich.console import Console
+
+    out = console()
+    needed = out.measure(table, options=out.options.update(max_width=_WIDEST)).minimum
+    if needed > out.width:
+        out = Console(width=needed, highlight=False)
+    out.print(table)
+
+
+def default_form(output: Path | None) -> TableFormat:
+    """Return the form for a file's name, a terminal or a pipe."""
     if output is None:
         return TableFormat.table if sys.stdout.isatty() else TableFormat.csv
     endings = {".json": TableFormat.json, ".md": TableFormat.markdown, ".txt": TableFormat.table}
@@ -101,7 +116,8 @@ def _rich_table(columns: Sequence[str], rows: Sequence[Record], title: str) -> A
     table = Table(box=box.SIMPLE_HEAD, title=title, title_style="bold", title_justify="left")
     for column in columns:
         text = any(isinstance(row[column], str) for row in rows)
-        table.add_column(column, justify="left" if text else "right", overflow="fold")
+        justify: Literal["left", "right"] = "left" if text else "right"
+        table.add_column(column, justify=justify, overflow="fold", no_wrap=not text)
     for row in rows:
         table.add_row(*(cell_text(row[column]) for column in columns))
     return table

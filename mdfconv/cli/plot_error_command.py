@@ -24,8 +24,11 @@ def command(
         typer.Option("--m-b", metavar="M", help="Beckmann's m_B; repeatable; default the paper's."),
     ] = None,
     method: Annotated[
-        str, typer.Option(metavar="METHOD", help="How m_B is converted for the others.")
-    ] = "closed-form",
+        str | None,
+        typer.Option(
+            metavar="METHOD", help="How --m-b is converted for the others; default closed-form."
+        ),
+    ] = None,
     metric: Annotated[
         str, typer.Option(metavar="METRIC", help="What is compared, and what a fit keeps.")
     ] = "unit",
@@ -90,12 +93,13 @@ def _only(shown: dict[str, Curves]) -> str:
 
 def _curves(
     m_b: list[float] | None,
-    method: str,
+    method: str | None,
     measure: Metric,
     reference: str,
     mdf: list[str] | None,
     points: int,
 ) -> dict[str, Curves]:
+    from mdfconv.conversion import DEFAULT_METHOD
     from mdfconv.distributions import distribution
     from mdfconv.reports.error_curves import DRAWN, PAPER_SETS, curves, parameters_for
 
@@ -107,10 +111,14 @@ def _curves(
         names = names or [name for name in ("beckmann", *DRAWN) if name != chief]
         wanted = dict.fromkeys([chief, *names])
         sets = {
-            f"error-m_b-{value:g}": parameters_for(value, list(wanted), method, measure)
+            f"error-m_b-{value:g}": parameters_for(
+                value, list(wanted), method or DEFAULT_METHOD, measure
+            )
             for value in m_b
         }
     else:
+        if method:
+            raise MdfconvError("--method converts an --m-b: give one")
         names = names or list(PAPER_SETS["fig1"])
         unknown = [name for name in [chief, *names] if name not in PAPER_SETS["fig1"]]
         if unknown:
@@ -119,6 +127,8 @@ def _curves(
             figure: {name: given[name] for name in dict.fromkeys([chief, *names])}
             for figure, given in PAPER_SETS.items()
         }
+    if any(set(given) == {chief} for given in sets.values()):
+        raise MdfconvError(f"{chief} is the reference: name another --mdf to compare with it")
     return {name: curves(given, chief, measure, points) for name, given in sets.items()}
 
 
@@ -128,7 +138,7 @@ def _files(
     from mdfconv.reports.text import csv_text, rounded_rows
 
     contents = {}
-    title = f"{found.reference} and its substitutes"
+    title = f"{found.reference} and its substitutes ({name})"
     forms = ["png"] * png + ["svg"] * svg
     if forms:
         from mdfconv.reports.error_figure import draw_errors

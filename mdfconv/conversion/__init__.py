@@ -83,6 +83,8 @@ def find_method(name: str) -> Method:
     MdfconvError
         If the name is not known; the message offers the nearest ones.
     """
+    if not isinstance(name, str):
+        raise MdfconvError(f"a method is named by a string, not {name!r}")
     key = name.strip().lower().replace("_", "-")
     if key not in _BY_NAME:
         raise unknown_name("method", name, list(_BY_NAME))
@@ -193,8 +195,10 @@ def explain(
         items = as_operand(values).ravel().tolist()
     axes = [item if isinstance(item, tuple) else (item,) for item in items]
     for axis in axes:
-        if len(axis) > 1:
+        if len(axis) != 1:
             _check_pair(axis, *sides)
+        if any(np.ndim(as_operand(value)) for value in axis):
+            raise MdfconvError("explain takes numbers and pairs of numbers, not arrays in a list")
     parameter = sides[0].decode([value for axis in axes for value in axis])
     result = _apply(rule, measure, parameter, *sides)
     stored = sides[1].encode(result).tolist()

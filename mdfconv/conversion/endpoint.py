@@ -78,6 +78,8 @@ def endpoint(name: str | Endpoint, gamma: float | None = None) -> Endpoint:
     """
     if isinstance(name, Endpoint):
         return name
+    if not isinstance(name, str):
+        raise MdfconvError(f"a distribution is named by a string, not {name!r}")
     head, colon, tail = name.partition(":")
     found = distribution(head)
     if gamma is not None and isinstance(found, GTR):

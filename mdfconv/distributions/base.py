@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mdfconv.distributions.evaluation import Array, Kernel, evaluate
+from mdfconv.distributions.evaluation import Array, Kernel, as_operand, evaluate
 from mdfconv.distributions.parameter import Encoding, Parameter
 from mdfconv.errors import MdfconvError
 
@@ -90,7 +90,9 @@ class Distribution(ABC):
 
     def from_half_tangent(self, tangent: ArrayLike) -> Any:
         """Return the parameter whose tan β_half is given; NaN where there is none."""
-        return self._legal(_elementwise(self._from_half_tangent, tangent))
+        given = np.asarray(as_operand(tangent), dtype=float)
+        positive = np.where(given > 0, given, np.nan)
+        return self._legal(_elementwise(self._from_half_tangent, positive))
 
     def peak_alpha(self, parameter: ArrayLike) -> Any:
         """Return the α for which 1/(π α²) is D(0), the normalized form at β = 0.
@@ -102,7 +104,9 @@ class Distribution(ABC):
 
     def from_peak_alpha(self, alpha: ArrayLike) -> Any:
         """Return the parameter whose D(0) is 1/(π α²); NaN where there is none."""
-        return self._legal(_elementwise(self._from_peak_alpha, alpha))
+        given = np.asarray(as_operand(alpha), dtype=float)
+        positive = np.where(given > 0, given, np.nan)
+        return self._legal(_elementwise(self._from_peak_alpha, positive))
 
     @abstractmethod
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:

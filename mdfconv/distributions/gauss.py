@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mdfconv.distributions.base import Distribution
 from mdfconv.distributions.evaluation import Array, inverse_square
 from mdfconv.distributions.parameter import Parameter
+
+_NODES = 80
 
 
 class Gauss(Distribution):
@@ -48,7 +48,8 @@ class Gauss(Distribution):
         return np.exp(exponent), -2 * exponent
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
-        return -_sine_integral_slope(parameter) / _sine_integral(parameter)
+        # −∂ ln Z/∂ ln m as a mean: differences of Faddeeva functions cancel for large m.
+        return -2 * _mean_square(parameter) / np.square(parameter)
 
     def _half_tangent(self, parameter: Array) -> Array:
         beta_half = parameter * np.sqrt(np.log(2))
@@ -93,22 +94,14 @@ def _sine_integral(parameter: Array) -> Array:
     return integral
 
 
-def _sine_integral_slope(parameter: Array) -> Array:
-    """Return the derivative of `_sine_integral` by ln m, from w'(z) = 2i/√π − 2 z w(z)."""
-    from scipy.special import wofz
-
-    def derivative(z: Any, value: Any) -> Any:
-        return 2j / np.sqrt(np.pi) - 2 * z * value
-
-    point = parameter + 1j * np.pi / (2 * parameter)
-    tail = np.exp(-np.square(np.pi / (2 * parameter)))
-    near, far = wofz(parameter), wofz(point)
-    by_m = derivative(parameter, near) + tail * (
-        far * np.pi**2 / (2 * parameter**3)
-        + derivative(point, far) * (1 - 1j * np.pi / (2 * parameter**2))
-    )
-    slope = 0.5 * np.sqrt(np.pi) * np.square(parameter) * by_m.imag
-    return _sine_integral(parameter) + slope
+def _mean_square(parameter: Array) -> Array:
+    """Return the mean of β² under the weight e^(−β²/m²) sin 2β on [0, π/2]."""
+    x, weight = np.polynomial.legendre.leggauss(_NODES)
+    # Beyond 12 m, or π/2, the weight is nothing.
+    reach = np.minimum(12 * parameter[..., None], 0.5 * np.pi)
+    beta = 0.5 * reach * (1 + x)
+    mass = weight * np.sin(2 * beta) * np.exp(-np.square(beta / parameter[..., None]))
+    return np.sum(mass * np.square(beta), axis=-1) / np.sum(mass, axis=-1)
 
 
 DISTRIBUTION = Gauss()

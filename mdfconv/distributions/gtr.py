@@ -43,7 +43,7 @@ class GTR(Distribution):
     exponent = Parameter("gamma", "γ", usual="1.5 ≤ γ ≤ 3")
 
     def __init__(self, gamma: float = 2.0) -> None:
-        self.gamma = float(self.exponent.check(gamma, self.name))
+        self.gamma = self.exponent.check_one(gamma, self.name)
 
     def unit(
         self,

@@ -88,6 +88,13 @@ class Parameter:
             f"{owner} {self.symbol} = {number_text(bad)} is {what}{which}: {self.legal}"
         )
 
+    def check_one(self, value: float, owner: str) -> float:
+        """Return a single legal value as a float, or say what is wrong with it."""
+        operand = self.check(value, owner)
+        if np.ndim(operand):
+            raise MdfconvError(f"{owner}: {self.name} is one number, not an array")
+        return float(operand)
+
 
 @dataclass(frozen=True)
 class Encoding:

@@ -19,12 +19,15 @@ from mdfconv.fitting.quadrature import LobeQuadrature, Quadrature
 
 # Candidates for the scan: multiples of the source's tan β_half, and parameters beyond those
 # for which a half width exists.
-_MULTIPLES = np.geomspace(0.01, 100, 50)
-_WIDE = np.geomspace(1.02, 1e4, 24)
+_LEAST_MULTIPLE, _MOST_MULTIPLE = 0.01, 100.0
+_MULTIPLES, _MULTIPLES_WITH_KINKS = 50, 150
+_WIDE = np.geomspace(1.02, 1e5, 26)
+_BEYOND = 1.3
 _WIDEST_TANGENT = 20.0
-_MINIMA = 2
+_MINIMA = 3
 _STEPS = 80
-_NEARLY = 1.5
+_NEARLY = 2.0
+_LOWER = 0.98
 # In ln p. A secant step of the first size leaves an error far below it, a bisection does not.
 _SECANT_TOLERANCE = 1e-6
 _BISECTION_TOLERANCE = 1e-10
@@ -125,9 +128,13 @@ class _Problem:
     def size(self) -> int:
         return self._rows.size
 
+    @property
+    def has_kinks(self) -> bool:
+        return bool(self._metric.kinks)
+
     def scan(self, candidates: Array) -> Array:
         """Return the approximate distance for each candidate parameter, shape (n, c)."""
-        beta, weight = self._quadrature.coarse(self._rows)
+        beta, weight = self._quadrature.coarse(self._rows, fine=bool(self._metric.kinks))
         weight = weight * self._metric.weight(beta)
         wanted = self._signal(self._source, beta, self._given, self._peak)
         shape = (*candidates.shape, beta.shape[1])
@@ -217,6 +224,11 @@ def _fit_block(problem: _Problem) -> tuple[Array, Array, Array]:
             found, value = _refine(problem, candidates, scanned, column)
             better = value < distance
             best[better], distance[better] = found[better], value[better]
+        # No minimum inside holds where the distance falls lower still towards an open end.
+        ends = scanned[:, 0]
+        if not problem.target.parameter.upper_closed:
+            ends = np.minimum(ends, scanned[:, -1])
+        best = np.where(ends < _LOWER * distance, np.nan, best)
         at_limit = np.zeros(problem.size, dtype=bool)
         upper = problem.target.parameter.upper
         if problem.target.parameter.upper_closed:
@@ -227,21 +239,27 @@ def _fit_block(problem: _Problem) -> tuple[Array, Array, Array]:
 def _candidates(problem: _Problem) -> Array:
     """Return target parameters over the whole legal range, ascending, shape (n, c)."""
     target = problem.target
-    tangents = problem.tangent[:, None] * np.append(_MULTIPLES, 1e6)
+    # Clipping at white makes minima narrow.
+    count = _MULTIPLES_WITH_KINKS if problem.has_kinks else _MULTIPLES
+    multiples = np.geomspace(_LEAST_MULTIPLE, _MOST_MULTIPLE, count)
+    tangents = problem.tangent[:, None] * np.append(multiples, 1e6)
     scaled = target.from_half_tangent(np.minimum(tangents, 1e8))
-    widest = np.fmax(scaled[:, :1], scaled[:, -1:])
-    wide = widest * _WIDE
+    # Exponents fall as lobes widen.
+    falls = np.nanmin(scaled) < scaled[0, 0]
+    widest = (np.nanmin if falls else np.nanmax)(scaled, axis=1, keepdims=True)
+    wide = widest / _WIDE if falls else widest * _WIDE
     if target.parameter.upper_closed:
         upper = target.parameter.upper
         wide = upper - (upper - widest) * np.linspace(0.95, 0, _WIDE.size)
-    found = np.concatenate([scaled, wide], axis=1)
-    # A candidate that is not legal repeats a neighbour.
-    found = np.where(np.isnan(found), widest, found)
+    # Where a tangent has no legal parameter, go on beyond the widest that has one.
+    missing = np.isnan(scaled)
+    beyond = widest * _BEYOND ** (np.cumsum(missing, axis=1) * (-1 if falls else 1))
+    found = np.concatenate([np.where(missing, beyond, scaled), wide], axis=1)
     return np.sort(found, axis=1)
 
 
 def _lowest_minima(scanned: Array) -> Indices:
-    """Return the columns of the lowest minima of each row, shape (n, 2); −1 for none.
+    """Return the columns of the lowest minima of each row, shape (n, 3); −1 for none.
 
     The scan is approximate, so a minimum that is nearly as low as the lowest counts as well.
     """

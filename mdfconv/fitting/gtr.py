@@ -53,8 +53,8 @@ class _OneRow:
     def nodes(self, rows: Indices, breaks: Array | None = None) -> tuple[Array, Array]:
         return self._quadrature.nodes(self._row, breaks)
 
-    def coarse(self, rows: Indices) -> tuple[Array, Array]:
-        return self._quadrature.coarse(self._row)
+    def coarse(self, rows: Indices, *, fine: bool = False) -> tuple[Array, Array]:
+        return self._quadrature.coarse(self._row, fine=fine)
 
 
 def _fit_one(

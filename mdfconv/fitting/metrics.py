@@ -13,7 +13,7 @@ import numpy as np
 
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import Parameter
-from mdfconv.errors import unknown_name
+from mdfconv.errors import MdfconvError, unknown_name
 
 # The sRGB encoding (IEC 61966-2-1) is linear up to here.
 _SRGB_TOE = 0.0031308
@@ -86,7 +86,7 @@ class Display(Energy):
     keeps = "picture on a screen"
 
     def __init__(self, exposure: float = 1.0) -> None:
-        self.exposure = float(_EXPOSURE.check(exposure, self.name))
+        self.exposure = _EXPOSURE.check_one(exposure, self.name)
         self.kinks = (_SRGB_TOE / self.exposure, 1 / self.exposure)
 
     def signal(self, value: Array) -> Array:
@@ -135,6 +135,8 @@ def metric(name: str | Metric, exposure: float = 1.0) -> Metric:
     """
     if isinstance(name, Metric):
         return name
+    if not isinstance(name, str):
+        raise MdfconvError(f"a metric is named by a string, not {name!r}")
     key = name.strip().lower()
     if key not in _METRICS:
         raise unknown_name("metric", name, list(_METRICS))

@@ -22,8 +22,8 @@ class Quadrature(Protocol):
     def nodes(self, rows: Indices, breaks: Array | None = None) -> tuple[Array, Array]:
         """Return angles and weights, shape (len(rows), k), with panels that end at breaks."""
 
-    def coarse(self, rows: Indices) -> tuple[Array, Array]:
-        """Return fewer angles and weights, enough to find the neighbourhood of a minimum."""
+    def coarse(self, rows: Indices, *, fine: bool = False) -> tuple[Array, Array]:
+        """Return fewer angles, enough for the neighbourhood of a minimum; more if `fine`."""
 
 
 class LobeQuadrature:
@@ -52,9 +52,9 @@ class LobeQuadrature:
             edges = np.sort(np.concatenate([edges, breaks], axis=1), axis=1)
         return _panels(edges, _ORDER)
 
-    def coarse(self, rows: Indices) -> tuple[Array, Array]:
+    def coarse(self, rows: Indices, *, fine: bool = False) -> tuple[Array, Array]:
         """Return the panels at a low order."""
-        return _panels(self._edges[rows], _SCAN_ORDER)
+        return _panels(self._edges[rows], _ORDER if fine else _SCAN_ORDER)
 
 
 class UniformSamples:
@@ -76,10 +76,11 @@ class UniformSamples:
         beta = self._beta[rows]
         return beta, np.ones_like(beta)
 
-    def coarse(self, rows: Indices) -> tuple[Array, Array]:
-        """Return a few of the samples."""
-        beta = self._beta[rows, :: max(1, self._beta.shape[1] // _SCAN_SAMPLES)]
-        return beta, np.ones_like(beta)
+    def coarse(self, rows: Indices, *, fine: bool = False) -> tuple[Array, Array]:
+        """Return a few of the samples, with the weight of all."""
+        count = self._beta.shape[1]
+        beta = self._beta[rows, :: max(1, count // _SCAN_SAMPLES)]
+        return beta, np.full_like(beta, count / beta.shape[1])
 
 
 def _panels(edges: Array, order: int) -> tuple[Array, Array]:

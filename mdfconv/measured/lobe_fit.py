@@ -58,6 +58,12 @@ class LobeFit:
     aic: float
     bic: float
 
+    @property
+    def at_limit(self) -> bool:
+        """Whether γ of GTR lies at the end of the range that is searched."""
+        ends = LOWEST_GAMMA * 1.001, HIGHEST_GAMMA * 0.999
+        return len(self.parameters) > 1 and not ends[0] < self.parameters[1] < ends[1]
+
     def model(self, beta: Array, quantity: str) -> Array:
         """Return the model at angles (radians), shape (n, channels)."""
         lobe = self.distribution.unit(beta, self.parameters[0]) / foreshortening(beta, quantity)
@@ -97,17 +103,16 @@ def fit_lobe(
         If there are fewer samples than unknowns, or nothing to fit.
     """
     problem = _Problem(data, target, loss, gamma)
-    # Both neighbourhoods of the lowest candidates, in case the scan misses a narrow one.
-    found = min(
-        (
-            least_squares(
-                problem.residual, start, problem.slope, bounds=problem.bounds, xtol=1e-12,
-                ftol=1e-14, gtol=1e-14, x_scale="jac",
-            )
-            for start in problem.starts()
-        ),
-        key=lambda result: result.cost,
-    )  # fmt: skip
+    found = least_squares(
+        problem.residual,
+        problem.start(),
+        problem.slope,
+        bounds=problem.bounds,
+        xtol=1e-12,
+        ftol=1e-14,
+        gtol=1e-14,
+        x_scale="jac",
+    )
     return problem.report(found.x)
 
 
@@ -137,12 +142,15 @@ class _Problem:
         if loss not in LOSSES:
             raise MdfconvError(f"unknown loss '{loss}'; known: {', '.join(LOSSES)}")
         self._log = loss == "log"
-        self._target = GTR(gamma) if gamma and isinstance(target, GTR) else target
+        self._target = GTR(gamma) if gamma is not None and isinstance(target, GTR) else target
         self._free_gamma = isinstance(target, GTR) and gamma is None
         keep = (data.values > 0).all(axis=1) if self._log else np.ones(data.beta.size, bool)
         self._data, self._beta, self._values = data, data.beta[keep], data.values[keep]
         self._cosine = foreshortening(self._beta, data.quantity)
         self._check()
+        # In units of the largest value, whatever the measurement's.
+        self._unit = float(np.max(np.abs(self._values)))
+        self._values = self._values / self._unit
         tangents = np.geomspace(_NARROWEST, _WIDEST, _CANDIDATES)
         candidates = self._target.from_half_tangent(tangents)
         self._candidates = np.log(np.sort(candidates[np.isfinite(candidates)]))
@@ -163,14 +171,13 @@ class _Problem:
         if np.ptp(self._values, axis=0).max() == 0:
             raise MdfconvError("all values are equal: there is no lobe to fit")
 
-    def starts(self) -> list[Array]:
-        """Return the two best points of a scan over p (and γ)."""
+    def start(self) -> Array:
+        """Return the best point of a scan over p (and γ)."""
         gammas = np.linspace(*_LOG_GAMMA_RANGE, _GAMMAS) if self._free_gamma else [None]
         points = [np.array([p] if g is None else [p, g]) for g in gammas for p in self._candidates]
         costs = [float(np.sum(np.square(self.residual(point)))) for point in points]
         lowest = points[int(np.argmin(costs))]
-        inside = np.clip(lowest, self.bounds[0] + 1e-9, self.bounds[1] - 1e-9)
-        return [inside]
+        return np.clip(lowest, self.bounds[0] + 1e-9, self.bounds[1] - 1e-9)
 
     def residual(self, point: Array) -> Array:
         """Return the residuals that the best offsets and scales leave, flattened."""
@@ -193,6 +200,8 @@ class _Problem:
     def report(self, point: Array) -> LobeFit:
         """Return the fit at a point, with standard errors from the full Jacobian."""
         residual, gain, offset, scale = self._project(point)
+        if not scale.any():
+            raise MdfconvError("the values do not fall with the angle: there is no lobe to fit")
         lobe, slopes = self._lobe(point)
         count, channels = residual.shape
         jacobian = np.zeros((count, channels, len(slopes) + 2 * channels))
@@ -204,18 +213,19 @@ class _Problem:
         flat = jacobian.reshape(count * channels, -1)
         unknowns = flat.shape[1]
         cost = float(np.sum(np.square(residual)))
-        variance = cost / (residual.size - unknowns)
-        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(flat.T @ flat)), 0) * variance)
+        spread = np.sqrt(cost / (residual.size - unknowns)) * _standard_deviations(flat)
         parameters = np.exp(point)
         likelihood = residual.size * np.log(max(cost, np.finfo(float).tiny) / residual.size)
+        if not self._log:
+            likelihood += 2 * residual.size * np.log(self._unit)
         model = offset + lobe[:, None] * scale
         return LobeFit(
             distribution=self._at(point),
             parameters=tuple(parameters.tolist()),
             errors=tuple((parameters * spread[: point.size]).tolist()),
-            offset=tuple(offset.tolist()),
-            scale=tuple(scale.tolist()),
-            rmse=float(np.sqrt(np.mean(np.square(model - self._values)))),
+            offset=tuple((self._unit * offset).tolist()),
+            scale=tuple((self._unit * scale).tolist()),
+            rmse=self._unit * float(np.sqrt(np.mean(np.square(model - self._values)))),
             log_rmse=_log_rmse(model, self._values),
             aic=float(likelihood + 2 * unknowns),
             bic=float(likelihood + unknowns * np.log(residual.size)),
@@ -260,15 +270,25 @@ class _Problem:
 
 
 def _solve(lobe: Array, values: Array, weight: Array) -> tuple[Array, Array]:
-    """Return weighted least-squares offset and scale of each channel."""
+    """Return weighted least-squares offset and scale ≥ 0 of each channel."""
     total = weight.sum(axis=0)
     centre = (weight * lobe[:, None]).sum(axis=0) / total
     mean = (weight * values).sum(axis=0) / total
     centred = lobe[:, None] - centre
     spread = (weight * np.square(centred)).sum(axis=0)
     shared = (weight * centred * (values - mean)).sum(axis=0)
-    scale = np.where(spread > 0, shared / np.where(spread > 0, spread, 1), 0)
+    # A lobe points outwards: a negative scale would be a hole.
+    scale = np.where(spread > 0, np.maximum(shared, 0) / np.where(spread > 0, spread, 1), 0)
     return mean - scale * centre, scale
+
+
+def _standard_deviations(jacobian: Array) -> Array:
+    """Return the square roots of the diagonal of (JᵀJ)⁻¹, without forming JᵀJ."""
+    norms = np.linalg.norm(jacobian, axis=0)
+    norms = np.where(norms > 0, norms, 1)
+    _, singular, basis = np.linalg.svd(jacobian / norms, full_matrices=False)
+    singular = np.maximum(singular, np.finfo(float).tiny)
+    return np.linalg.norm(basis / singular[:, None], axis=0) / norms
 
 
 def _log_rmse(model: Array, values: Array) -> float:

@@ -38,6 +38,11 @@ class Columns:
     unit: str | None = None
     values: tuple[str, ...] = ()
 
+    def refuse(self, path: Path, reason: str) -> None:
+        """Raise if columns are chosen for a file that leaves no choice."""
+        if self != Columns():
+            raise MdfconvError(f"{path}: {reason}: give no --angle, --angle-unit or --values")
+
 
 def read_text(path: Path, columns: Columns) -> Samples:
     """Read a text file of samples.
@@ -63,6 +68,7 @@ def read_text(path: Path, columns: Columns) -> Samples:
     tags = dict(re.findall(r"^#\s*(DIM|PARAM_IN|PARAM_OUT)\s+(.+?)\s*$", "\n".join(lines), re.M))
     header, table = _table(path, lines)
     if "DIM" in tags:
+        columns.refuse(path, "ALTA's header names its columns")
         return _alta(path, tags, table)
     angle = _column(path, columns.angle, header, table)
     chosen = [_column(path, name, header, table) for name in columns.values]
@@ -108,16 +114,17 @@ def _column(path: Path, name: str, header: list[str], table: Array) -> int:
     lowered = [entry.lower() for entry in header]
     if name.lower() in lowered:
         return lowered.index(name.lower())
-    if name.isdigit() and 1 <= int(name) <= table.shape[1]:
+    if name.isdecimal() and 1 <= int(name) <= table.shape[1]:
         return int(name) - 1
     raise MdfconvError(f"{path}: no column '{name}'; there are {', '.join(header)}")
 
 
 def _unit(path: Path, wanted: str | None, name: str, angle: Array) -> str:
     if wanted:
-        if wanted not in UNITS:
+        known = [unit for unit in UNITS if unit.rstrip("s") == wanted.lower().rstrip("s")]
+        if not known:
             raise MdfconvError(f"unknown angle unit '{wanted}'; known: {', '.join(UNITS)}")
-        return wanted
+        return known[0]
     for unit, hint in _HINTS.items():
         if hint.search(name):
             return unit
@@ -133,7 +140,7 @@ def _alta(path: Path, tags: dict[str, str], table: Array) -> Samples:
     """Interpret ALTA's header: one input dimension, any number of outputs."""
     dimensions = tags["DIM"].split()
     given = tags.get("PARAM_IN", "").strip().upper()
-    if len(dimensions) < 2 or dimensions[0] != "1" or not dimensions[1].isdigit():
+    if len(dimensions) < 2 or dimensions[0] != "1" or not dimensions[1].isdecimal():
         raise MdfconvError(f"{path}: ALTA data of dimension '{tags['DIM']}'; only 1 N is read")
     outputs = int(dimensions[1])
     if given not in _ALTA_INPUTS:

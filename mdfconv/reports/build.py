@@ -19,7 +19,7 @@ from mdfconv.reports.comparison_figure import draw_comparison
 from mdfconv.reports.error_curves import PAPER_SETS, curves
 from mdfconv.reports.error_figure import draw_errors
 from mdfconv.reports.table2 import COLUMNS, compare, fit_table, paper_sweep
-from mdfconv.reports.text import csv_text, markdown_text, rounded_rows, write_file
+from mdfconv.reports.text import csv_text, markdown_text, rounded_rows, write_files
 
 Files = dict[str, bytes]
 
@@ -259,11 +259,10 @@ def build(folder: Path) -> Iterator[Artefact]:
     done = []
     for make in _ARTEFACTS:
         artefact = make()
-        for name, content in artefact.files.items():
-            write_file(folder / name, content)
+        write_files({folder / name: content for name, content in artefact.files.items()})
         done.append(artefact)
         yield artefact
-    write_file(folder / "README.md", _text(_index(done)))
+    write_files({folder / "README.md": _text(_index(done))})
 
 
 def _index(artefacts: list[Artefact]) -> str:

@@ -17,7 +17,8 @@ from mdfconv.reports.sphere import Frame, cross_section, lights, microfacet, rad
 from mdfconv.reports.text import rounded_rows
 
 SUBSTITUTES = ("blinn-phong", "gauss", "ggx", "sawicki", "schlick")
-_SECTION_POINTS = 801
+_SECTION_POINTS = 401
+_SECTION_WIDTHS = 4.8  # half widths of the reference
 _KEPT = {"unit": "shape", "energy": "light", "display": "picture"}
 
 
@@ -190,25 +191,31 @@ def compare(
         ]
         for rule in rules
     }
-    reference = _render("beckmann", parameter, scene, 1.0)
+    reach = _SECTION_WIDTHS * float(distribution("beckmann").half_width(parameter))
+    position, normals = cross_section(_SECTION_POINTS, min(reach, 1.0))
+    reference = _render("beckmann", parameter, scene, normals, 1.0)
+    if reference.image.max() < 0.5 * reference.section.max():
+        raise MdfconvError(
+            f"the highlight of beckmann m_B = {parameter:g} falls between the pixels: raise --size"
+        )
     # The pixel at the highlight need not hit the peak; the section's is as good a unit.
     unit = float(max(reference.image.max(), reference.section.max()))
     return Comparison(
         scene,
         Rendering("beckmann", parameter, reference.image / unit, reference.section / unit),
         {
-            label: [_render(name, value, scene, unit) for name, value in pairs]
+            label: [_render(name, value, scene, normals, unit) for name, value in pairs]
             for label, pairs in converted.items()
         },
-        cross_section(_SECTION_POINTS)[0],
+        position,
     )
 
 
-def _render(name: str, parameter: float, scene: Scene, unit: float) -> Rendering:
+def _render(name: str, parameter: float, scene: Scene, normals: Array, unit: float) -> Rendering:
     surface = microfacet(distribution(name), parameter, scene.brdf, normalized=scene.normalized)
     light = lights(scene.light)
     image = Frame(scene.size).render(surface, light)
-    section = radiance(cross_section(_SECTION_POINTS)[1], surface, light)
+    section = radiance(normals, surface, light)
     return Rendering(name, parameter, image / unit, section / unit)
 
 

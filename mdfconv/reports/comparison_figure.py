@@ -14,6 +14,7 @@ from mdfconv.reports.sphere import Frame
 
 _CELL = 1.62  # inches a picture
 _PLOT = 2.6
+_NARROWEST = 6.4
 _LOWEST = 1e-3  # of the reference's peak: where the section is cut off
 _BACKGROUND = 0.05  # linear light, so that the silhouette shows
 
@@ -31,13 +32,16 @@ def draw_comparison(found: Comparison, dpi: int = 120) -> bytes:
     plt = pyplot()
     rows = list(found.rows.items())
     columns = 1 + max(len(renderings) for _, renderings in rows)
-    size = (_CELL * columns + 0.4, (_CELL + 0.32) * len(rows) + _PLOT + 0.6)
-    figure = plt.figure(figsize=size)
-    top, bottom = figure.subfigures(2, 1, height_ratios=(size[1] - _PLOT - 0.6, _PLOT))
+    # A pixel of the sheet shows at most a pixel of the picture.
+    cell = max(_CELL, found.scene.size / dpi)
+    width = max(cell * columns + 0.4, _PLOT * len(rows), _NARROWEST)
+    height = (cell + 0.42) * len(rows)
+    figure = plt.figure(figsize=(width, height + _PLOT + 0.6))
+    top, bottom = figure.subfigures(2, 1, height_ratios=(height, _PLOT))
     scene = found.scene
     figure.suptitle(
-        f"Beckmann m_B = {found.reference.parameter:.4g} and its substitutes: {scene.brdf}, "
-        f"{scene.light} light,\n{'normalized' if scene.normalized else 'unit form'} D, exposure "
+        f"Beckmann m_B = {found.reference.parameter:.4g} and its substitutes: {scene.brdf},\n"
+        f"{scene.light} light, {'normalized' if scene.normalized else 'unit form'} D, exposure "
         f"{scene.exposure:g} (1: the peak of Beckmann is white)",
         fontsize=10,
     )
@@ -55,7 +59,7 @@ def draw_comparison(found: Comparison, dpi: int = 120) -> bytes:
     sections = bottom.subplots(1, len(rows), sharey=True, squeeze=False)[0]
     for axes, (rule, renderings) in zip(sections, rows, strict=True):
         _section(axes, found, rule, renderings)
-    sections[0].set_ylabel("luminance / peak of beckmann")
+    sections[0].set_ylabel("luminance / peak of beckmann", fontsize=8)
     sections[0].legend(fontsize=6.5, loc="upper left", handlelength=2.4)
     return encoded(figure, dpi=dpi)
 

@@ -27,6 +27,7 @@ PAPER_SETS: Mapping[str, Mapping[str, float]] = {
 }  # fmt: skip
 DRAWN = ("blinn-phong", "gauss", "ggx", "sawicki", "schlick")
 _HALF_WIDTHS = 4.8
+_MOST_POINTS = 1_000_000
 _QUANTITIES = {
     "unit": "unit form D / max D",
     "energy": "normalized D / max D of the reference",
@@ -100,8 +101,8 @@ def curves(parameters: Mapping[str, float], reference: str, metric: Metric, poin
     points : int
         Number of angles, from 0 to 4.8 β_half of the reference, at most π/2.
     """
-    if points < 2:
-        raise MdfconvError("the number of points is at least 2")
+    if not 2 <= points <= _MOST_POINTS:
+        raise MdfconvError(f"the number of points is from 2 to {_MOST_POINTS}")
     entry = distribution(reference)
     given = np.array([parameters[reference]])
     reach = _HALF_WIDTHS * float(entry.half_width(given)[0])

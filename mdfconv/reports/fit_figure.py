@@ -32,13 +32,16 @@ def draw_fits(data: Samples, fits: list[LobeFit], title: str) -> bytes:
     upper.plot(degrees, data.values[:, 0], "o", color="0.6", markersize=3, label="data")
     for fit in fits:
         style = line_style(fit.distribution.name)
-        values = ", ".join(f"{value:.4g}" for value in fit.parameters)
-        label = f"{fit.distribution.name} {fit.distribution.parameter.symbol} = {values}"
+        symbols = fit.distribution.parameter.symbol, "γ"
+        values = ", ".join(
+            f"{symbol} = {value:.4g}"
+            for symbol, value in zip(symbols, fit.parameters, strict=False)
+        )
+        label = f"{fit.distribution.name}, {values}"
         upper.plot(np.degrees(beta), fit.model(beta, data.quantity)[:, 0], label=label, **style)
         rest = fit.model(data.beta, data.quantity)[:, 0] - data.values[:, 0]
         lower.plot(degrees, rest, **style)
-    channel = f", channel {data.channels[0]}" if len(data.channels) > 1 else ""
-    upper.set_title(title + channel)
+    upper.set_title(title)
     upper.set_ylabel("BRDF [1/sr]" if data.quantity == "brdf" else "distribution")
     upper.legend(fontsize=8)
     lower.set_ylabel("fit − data")

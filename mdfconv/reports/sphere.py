@@ -149,16 +149,27 @@ class Frame:
         return picture.reshape(self.size, self.size)
 
 
-def cross_section(count: int) -> tuple[Array, Array]:
+def cross_section(count: int, width: float) -> tuple[Array, Array]:
     """Return positions from −1 to 1 radius along the line through the highlight, and normals.
 
     The line runs through the centre of the sphere's disc, towards the light.
+
+    Parameters
+    ----------
+    count : int
+        Twice this many positions, plus one: so many all along the line, so many within the
+        highlight, and its centre.
+    width : float
+        How far from its centre the highlight is resolved, radians.
     """
-    position = np.linspace(-1, 1, count)[1:-1]
+    centre = float(np.arccos((LIGHT + VIEW)[2] / np.linalg.norm(LIGHT + VIEW)))
+    spread = centre + np.linspace(-width, width, count)
+    everywhere = np.linspace(-0.5 * np.pi, 0.5 * np.pi, count + 2)[1:-1]
+    angle = np.unique(np.concatenate([everywhere, spread, [centre]]))
+    angle = angle[np.abs(angle) < 0.5 * np.pi]
     across = LIGHT[:2] / np.linalg.norm(LIGHT[:2])
-    z = np.sqrt(1 - position**2)
-    normals = np.column_stack([position[:, None] * across, z])
-    return position, normals
+    normals = np.column_stack([np.sin(angle)[:, None] * across, np.cos(angle)])
+    return np.sin(angle), normals
 
 
 def highlight() -> tuple[float, float]:

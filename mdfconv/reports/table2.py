@@ -18,6 +18,7 @@ import numpy as np
 from mdfconv.conversion.residual import residual
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
 from mdfconv.fitting.core import fit
 from mdfconv.fitting.metrics import Metric, Unit
 from mdfconv.fitting.quadrature import UniformSamples
@@ -173,11 +174,18 @@ def _fit_rows(m_b: Array, reach: Array, metric: Metric, extended: bool) -> list[
     for column, name in (FITTED | EXTENDED if extended else FITTED).items():
         best = fit(source, m_b, distribution(name), metric, samples)
         columns[column] = best.parameter
+        _check_answers(m_b, best.parameter, name)
         columns[f"rmse_{column}"] = error(distribution(name), best.parameter, best.distance)
     if extended:
         columns |= _gtr_columns(m_b, metric, samples)
     order = (*COLUMNS, *EXTENDED_COLUMNS) if extended else COLUMNS
     return [{key: float(columns[key][row]) for key in order} for row in range(m_b.size)]
+
+
+def _check_answers(m_b: Array, found: Array, name: str) -> None:
+    if np.isnan(found).any():
+        bad = float(m_b[int(np.argmax(np.isnan(found)))])
+        raise MdfconvError(f"beckmann m_B = {bad:g} has no best fit in {name}")
 
 
 def _error_of_eq11(m_b: Array, n: Array, reach: Array, metric: Metric) -> Array:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import json
+import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -17,8 +19,16 @@ Record = Mapping[str, Any]
 
 
 def json_text(records: Any) -> str:
-    """Return records as indented JSON; NaN and infinities are refused."""
-    return json.dumps(records, indent=2, ensure_ascii=False, allow_nan=False)
+    """Return records as indented JSON; NaN and infinities become null."""
+    return json.dumps(_finite(records), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    return [_finite(entry) for entry in value] if isinstance(value, list | tuple) else value
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Record]) -> str:
@@ -53,25 +63,32 @@ def markdown_text(columns: Sequence[str], rows: Sequence[Record]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def write_file(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all: beside its place first, then renamed.
+def write_files(contents: Mapping[Path, bytes]) -> None:
+    """Write files whole or not at all: all beside their places first, then renamed.
 
     Raises
     ------
     MdfconvError
-        If the place cannot be written.
+        If a place cannot be written; nothing is then changed.
     """
-    beside = None
+    staged: dict[str, Path] = {}
+    path = Path()
+    # A temporary file is private; give it the permissions of any other new file.
+    mask = os.umask(0)
+    os.umask(mask)
     try:
-        with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
-            beside = file.name
-            file.write(content)
-        # A temporary file is private; give it the permissions of any other new file.
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(beside, 0o666 & ~mask)
-        os.replace(beside, path)
+        for path, content in contents.items():
+            with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
+                staged[file.name] = path
+                file.write(content)
+            os.chmod(file.name, 0o666 & ~mask)
+            if path.is_dir():
+                raise IsADirectoryError(errno.EISDIR, "is a directory")
+        for beside, path in list(staged.items()):
+            os.replace(beside, path)
+            del staged[beside]
     except OSError as error:
-        if beside:
-            Path(beside).unlink(missing_ok=True)
         raise MdfconvError(f"cannot write {path}: {error.strerror}") from None
+    finally:
+        for beside in staged:
+            Path(beside).unlink(missing_ok=True)

@@ -81,6 +81,47 @@ def test_best_fits_at_the_end_of_the_range():
     assert 5 < nearly < 10
 
 
+def test_nearly_uniform_lobes_have_small_exponents():
+    gauss, ggx, phong, sawicki = map(
+        mdfconv.distribution, ("gauss", "ggx", "blinn-phong", "sawicki")
+    )
+    wide = fit(gauss, np.array([10.0]), phong, Unit())
+    assert wide.parameter[0] == pytest.approx(0.00915, rel=2e-2)
+    assert fit(ggx, np.array([0.999]), phong, Energy()).parameter[0] == pytest.approx(
+        0.0020, rel=2e-2
+    )
+    # Rougher than any Sawicki with a positive exponent.
+    assert np.isnan(fit(ggx, np.array([0.95]), sawicki, Unit()).parameter[0])
+
+
+def test_a_minimum_must_beat_the_open_ends():
+    beckmann = mdfconv.distribution("beckmann")
+    for target in ("sawicki", "gauss"):
+        entry = mdfconv.distribution(target)
+        assert np.isnan(fit(beckmann, np.array([10.0]), entry, Energy()).parameter[0])
+
+
+def test_gauss_slope_for_nearly_uniform_lobes():
+    gauss = mdfconv.distribution("gauss")
+    for m in (0.1, 1.0, 30.0, 1e3, 1e6):
+        exact = -2 / m**2 * mean_square(m)
+        got = gauss._log_slope_at_normal(np.array([[m]]))[0, 0]
+        assert got == pytest.approx(exact, rel=1e-10)
+
+
+def mean_square(m):
+    with mp.workdps(30):
+        edges = [0, *(e for e in (m / 4, m / 2, m, 2 * m, 4 * m, 8 * m) if e < 1.57), mp.pi / 2]
+        weight = lambda b: mp.exp(-((b / m) ** 2)) * mp.sin(2 * b)  # noqa: E731
+        return float(mp.quad(lambda b: b**2 * weight(b), edges) / mp.quad(weight, edges))
+
+
+def test_display_at_high_exposure():
+    source = mdfconv.distribution("sawicki")
+    found = fit(source, np.array([1.0573976]), GTR(2.971177), Display(13.311275))
+    assert found.parameter[0] == pytest.approx(0.49954, rel=1e-4)
+
+
 def test_fit_of_itself_is_itself():
     for name in NAMES:
         entry = mdfconv.distribution(name)

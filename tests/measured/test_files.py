@@ -174,6 +174,10 @@ GOOD = table(BETA_DEGREES, [0.1 + 2 * GGX], "deg,v")
         (GOOD, ("--loss", "cubic"), "'cubic' is not one of"),
         (GOOD, ("--max-angle", "0"), "--max-angle"),
         (GOOD, ("--tolerance", "-1"), "--tolerance"),
+        (GOOD, ("--gamma", "0"), "γ > 0"),
+        (GOOD, ("--angle", "²"), "no column"),
+        ("deg,v\n" + "".join(f"{k},{k}\n" for k in range(20)), (), "no lobe to fit"),
+        ("#DIM 1 3\n#PARAM_IN COS_TH\n1 1 1 1\n", ("--angle", "2"), "give no --angle"),
         (GOOD, ("--png", "/nonexistent/a.png"), "cannot write"),
         (GOOD, ("--output", "/nonexistent/a.csv"), "cannot write"),
     ],
@@ -185,6 +189,29 @@ def test_bad_data(tmp_path, content, arguments, words):
     assert (status, out) == (2, "")
     assert words in err
     assert err.count("\n") == 1
+
+
+def test_nothing_is_written_over_or_left_behind(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(GOOD)
+    for option in ("--output", "--png"):
+        status, out, err = run("fit", path, "--to", "ggx", option, path)
+        assert (status, out) == (2, "")
+        assert "is the file of samples" in err
+    assert path.read_text() == GOOD
+    picture = tmp_path / "a.png"
+    status, _, _ = run("fit", path, "--to", "ggx", "--png", picture, "--output", "/proc/x/y")
+    assert status == 2
+    assert not picture.exists()
+
+
+def test_full_precision_in_csv(tmp_path):
+    path, out = tmp_path / "a.csv", tmp_path / "fits.csv"
+    path.write_text(GOOD)
+    assert run("fit", path, "--to", "ggx", "--output", out)[0] == 0
+    row = out.read_text().splitlines()[1].split(",")
+    assert len(row[6]) > 12
+    assert float(row[6]) == pytest.approx(2, rel=1e-9)
 
 
 def test_missing_file(tmp_path):

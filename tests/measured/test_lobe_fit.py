@@ -120,6 +120,20 @@ def test_nothing_to_fit(values, words):
         fit_lobe(Samples(beta, values, ("1",), "ndf"), mdfconv.distribution("ggx"))
 
 
+@pytest.mark.parametrize("unit", [1e-200, 1e-7, 1e8, 1e200])
+def test_units_do_not_matter(unit):
+    data = synthetic("ggx", np.random.default_rng(3))
+    one = fit_lobe(data, mdfconv.distribution("ggx"))
+    scaled = Samples(BETA, data.values * unit, data.channels, data.quantity)
+    other = fit_lobe(scaled, mdfconv.distribution("ggx"))
+    assert other.parameters == pytest.approx(one.parameters, rel=1e-7)
+    assert other.errors == pytest.approx(one.errors, rel=1e-5)
+    assert other.scale[0] == pytest.approx(one.scale[0] * unit, rel=1e-7)
+    assert other.rmse == pytest.approx(one.rmse * unit, rel=1e-7)
+    difference = 2 * data.values.size * np.log(unit)
+    assert other.aic - one.aic == pytest.approx(difference, rel=1e-7)
+
+
 def test_unknown_loss():
     with pytest.raises(ValueError, match="unknown loss"):
         fit_lobe(synthetic("ggx"), mdfconv.distribution("ggx"), "cubic")

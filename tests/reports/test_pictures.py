@@ -56,7 +56,7 @@ def test_highlight_has_the_analytic_place_and_height(name, brdf):
     parameter = 200.0 if name in ("blinn-phong", "sawicki") else 0.1
     entry = mdfconv.distribution(name)
     surface = microfacet(entry, parameter, brdf, normalized=True)
-    position, normals = cross_section(20001)
+    position, normals = cross_section(20001, 0.5)
     light = lights("directional")
     section = radiance(normals, surface, light)
     place = int(np.argmax(section))
@@ -99,7 +99,8 @@ def test_area_light():
     np.testing.assert_allclose(np.linalg.norm(square.directions, axis=1), 1)
     surface = microfacet(mdfconv.distribution("ggx"), 0.05, "ashikhmin-shirley", normalized=True)
     wide, narrow = (
-        radiance(cross_section(401)[1], surface, light) for light in (square, lights("directional"))
+        radiance(cross_section(401, 0.5)[1], surface, light)
+        for light in (square, lights("directional"))
     )
     assert wide.max() < narrow.max()
     assert np.count_nonzero(wide > 0.5 * wide.max()) > np.count_nonzero(narrow > 0.5 * narrow.max())
@@ -185,15 +186,15 @@ def test_compare(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("plot-error", "--output", "missing"), "not a directory"),
+        (("plot-error", "--output", "missing"), "not an existing directory"),
         (("plot-error", "--mdf", "gx"), "did you mean ggx"),
         (("plot-error", "--reference", "smoothie"), "give --m-b"),
         (("plot-error", "--m-b", "-1"), "m_B > 0"),
         (("plot-error", "--m-b", "0.9"), "half-angle answers"),
-        (("plot-error", "--points", "1"), "at least 2"),
+        (("plot-error", "--points", "1"), "from 2 to"),
         (("plot-error", "--dpi", "0"), "--dpi"),
         (("plot-error", "--mdf", "ashikhmin-shirley"), "blinn-phong"),
-        (("compare", "--output", "missing"), "not a directory"),
+        (("compare", "--output", "missing"), "not an existing directory"),
         (("compare", "--size", "0"), "16 to 4096"),
         (("compare", "--dpi", "-5"), "--dpi"),
         (("compare", "--exposure", "0"), "exposure"),
@@ -223,3 +224,31 @@ def test_an_unwritable_folder(tmp_path, command):
     status, _, err = run(command, cwd=tmp_path / "here")
     assert status == 2
     assert "cannot create" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("plot-error", "--method", "ward"), "give one"),
+        (("plot-error", "--mdf", "beckmann"), "is the reference"),
+        (("plot-error", "--points", "100000000000"), "from 2 to"),
+        (("compare", "--m-b", "1e-8"), "raise --size"),
+        (("compare", "--m-b", "0.001", "--size", "64"), "raise --size"),
+        (("konvert",), "did you mean convert"),
+    ],
+)
+def test_requests_that_would_mislead(tmp_path, arguments, words):
+    status, out, err = run(*arguments, cwd=tmp_path)
+    assert (status, out) == (2, "")
+    assert words in err
+    assert err.count("\n") == 1
+
+
+def test_a_sheet_shows_the_pixels_asked_for(tmp_path):
+    status, _, _ = run(
+        "compare", "--m-b", 0.2, "--mdf", "ggx", "--size", 400, "--dpi", 100, "--output", tmp_path
+    )
+    assert status == 0
+    with Image.open(tmp_path / "compare-m_b-0.2.png") as picture:
+        assert picture.size[0] > 800
+        assert picture.size[1] > 1200

@@ -44,8 +44,11 @@ class Gauss(Distribution):
         return 1 / (np.pi * _sine_integral(parameter))
 
     def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        exponent = np.square(beta) * -inverse_square(parameter)
-        return np.exp(exponent), -2 * exponent
+        exponent = np.square(beta)
+        exponent *= -inverse_square(parameter)
+        value = np.exp(exponent)
+        exponent *= -2
+        return value, exponent
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         # −∂ ln Z/∂ ln m as a mean: differences of Faddeeva functions cancel for large m.

@@ -52,7 +52,8 @@ class GGX(AnisotropicDistribution):
         fall = 1 + ratio
         square /= fall
         ratio /= fall
-        return np.square(square, out=square), 4 * ratio
+        ratio *= 4
+        return np.square(square, out=square), ratio
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return np.full_like(parameter, -2)

@@ -46,12 +46,19 @@ class Sawicki(Distribution):
         return 3 * (3 + parameter) / (8 * np.pi)
 
     def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        square = tangent_square(beta)
-        secant = np.sqrt(1 + square)
-        drop = square / (secant * (1 + secant))
-        fall = 1 + drop * (0.25 * (parameter - 1))
-        value = 1 / (secant * np.square(np.square(fall)))
-        return value, drop * -parameter / fall
+        drop = tangent_square(beta)
+        sum_ = 1 + drop
+        secant = np.sqrt(sum_)
+        sum_ += secant
+        drop /= sum_
+        fall = np.multiply(drop, 0.25 * (parameter - 1), out=sum_)
+        fall += 1
+        drop *= -parameter
+        drop /= fall
+        np.square(fall, out=fall)
+        np.square(fall, out=fall)
+        fall *= secant
+        return np.divide(1, fall, out=fall), drop
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return parameter / (parameter + 3)

@@ -58,7 +58,7 @@ class Unit(Metric):
 
     def weight(self, beta: Array) -> Array:
         """Return 1."""
-        return np.ones_like(beta)
+        return np.broadcast_to(1.0, beta.shape)
 
 
 class Energy(Metric):

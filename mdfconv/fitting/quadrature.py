@@ -73,8 +73,8 @@ class UniformSamples:
 
     def nodes(self, rows: Indices, breaks: Array | None = None) -> tuple[Array, Array]:
         """Return the samples; they are what they are, wherever the breaks."""
-        beta = self._beta[rows]
-        return beta, np.ones_like(beta)
+        beta = self._beta if rows.size == len(self._beta) else self._beta[rows]
+        return beta, np.broadcast_to(1.0, beta.shape)
 
     def coarse(self, rows: Indices, *, fine: bool = False) -> tuple[Array, Array]:
         """Return a few of the samples, with the weight of all."""

@@ -25,6 +25,8 @@ class Metric(ABC):
 
     Attributes
     ----------
+    keeps, quantity : str
+        What a fit under the metric keeps, and what its signal is, in words.
     normalized : bool
         Whether D is the normalized or the unit form.
     kinks : tuple of float
@@ -33,6 +35,7 @@ class Metric(ABC):
 
     name: ClassVar[str]
     keeps: ClassVar[str]
+    quantity: ClassVar[str]
     normalized: ClassVar[bool]
     kinks: tuple[float, ...] = ()
 
@@ -54,6 +57,7 @@ class Unit(Metric):
 
     name = "unit"
     keeps = "shape of the lobe"
+    quantity = "unit form D / max D"
     normalized = False
 
     def weight(self, beta: Array) -> Array:
@@ -66,6 +70,7 @@ class Energy(Metric):
 
     name = "energy"
     keeps = "light"
+    quantity = "normalized D / max D of the reference"
     normalized = True
 
     def weight(self, beta: Array) -> Array:
@@ -84,6 +89,7 @@ class Display(Energy):
 
     name = "display"
     keeps = "picture on a screen"
+    quantity = "normalized D as a screen shows it"
 
     def __init__(self, exposure: float = 1.0) -> None:
         self.exposure = _EXPOSURE.check_one(exposure, self.name)

@@ -19,7 +19,6 @@ from mdfconv.reports.text import rounded_rows
 SUBSTITUTES = ("blinn-phong", "gauss", "ggx", "sawicki", "schlick")
 _SECTION_POINTS = 401
 _SECTION_WIDTHS = 4.8  # half widths of the reference
-_KEPT = {"unit": "shape", "energy": "light", "display": "picture"}
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ class Rule:
     def label(self) -> str:
         """The rule and what it keeps, in words."""
         if self.method == "fit":
-            return f"fit {self.metric.name} ({_KEPT[self.metric.name]})"
+            return f"fit {self.metric.name} ({self.metric.keeps.split()[0]})"
         return f"{self.method} (shape)" if self.method == "closed-form" else self.method
 
 

@@ -28,11 +28,6 @@ PAPER_SETS: Mapping[str, Mapping[str, float]] = {
 DRAWN = ("blinn-phong", "gauss", "ggx", "sawicki", "schlick")
 _HALF_WIDTHS = 4.8
 _MOST_POINTS = 1_000_000
-_QUANTITIES = {
-    "unit": "unit form D / max D",
-    "energy": "normalized D / max D of the reference",
-    "display": "normalized D as a screen shows it",
-}
 
 
 @dataclass(frozen=True)
@@ -120,4 +115,4 @@ def curves(parameters: Mapping[str, float], reference: str, metric: Metric, poin
         if name != reference
     }
     shown = {name: parameters[name] for name in values}
-    return Curves(shown, beta, values, _QUANTITIES[metric.name], errors)
+    return Curves(shown, beta, values, metric.quantity, errors)

@@ -22,6 +22,7 @@ _DASHES: dict[str, tuple[str, Any]] = {
     "sawicki": ("#CC79A7", (0, (8, 2, 1, 2, 1, 2))),
     "smoothie": ("#E69F00", (0, (3, 1))),
 }
+_OTHER = ("#999999", (0, (5, 3)))
 
 
 def pyplot() -> Any:
@@ -48,7 +49,7 @@ def pyplot() -> Any:
 
 def line_style(name: str) -> dict[str, Any]:
     """Return the colour and dashes of a distribution, as keywords for ``plot``."""
-    color, dashes = _DASHES[name]
+    color, dashes = _DASHES.get(name, _OTHER)
     return {"color": color, "linestyle": dashes, "linewidth": 1.4}
 
 

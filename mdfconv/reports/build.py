@@ -137,6 +137,7 @@ def closed_forms() -> Artefact:
 # The paper's prose: from N to the largest error of Blinn/Phong in per cent.
 _PROSE = {10: 3.5, 40: 1.0, 100: 0.4, 1000: 0.03}
 _FIGURE_DPI = 110
+_PICTURE_SIZE = 192
 
 
 def error_figures() -> Artefact:
@@ -199,7 +200,7 @@ def pictures() -> Artefact:
     """Return Figures 4 and 5: pictures, sections through the highlight, and their errors."""
     files: Files = {}
     rows: list[dict[str, object]] = []
-    scene = Scene()
+    scene = Scene(size=_PICTURE_SIZE)
     for name, m_b in (("fig4", 0.4), ("fig5", 0.04464)):
         found = compare_pictures(m_b, default_rules(scene.exposure), scene)
         columns, section = found.section_rows()
@@ -225,7 +226,7 @@ def pictures() -> Artefact:
         "Sawicki 2021, Figures 3 to 5: one sphere, the distributions exchanged",
         "Blinn/Phong and Gauss cannot be told from Beckmann, GGX has the gentler edges, as the "
         "paper says",
-        "mdfconv compare",
+        "mdfconv compare --size 192",
     )
 
 

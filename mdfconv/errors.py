@@ -8,6 +8,13 @@ class MdfconvError(ValueError):
     """
 
 
+def check_name(kind: str, name: object) -> str:
+    """Return a name that is a string; raise `MdfconvError` for anything else."""
+    if not isinstance(name, str):
+        raise MdfconvError(f"a {kind} is named by a string, not {name!r}")
+    return name
+
+
 def unknown_name(kind: str, name: str, known: list[str]) -> MdfconvError:
     """Return the error for a name that is not known, with the nearest ones that are.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli.folder import check_folder, write_all
+from mdfconv.cli.names import one_parameter_names
 from mdfconv.cli.output import TableFormat, write_records
 from mdfconv.errors import MdfconvError
 
@@ -92,24 +93,25 @@ def command(
 
     mdfconv compare --m-b 0.1 --method fit --metric display --brdf cook-torrance --size 512
     """
-    from mdfconv.reports.comparison import SUBSTITUTES, Scene, compare
+    from mdfconv.reports.comparison import PAPER_FIGURES, Scene, compare
     from mdfconv.reports.comparison_figure import draw_comparison
-    from mdfconv.reports.text import csv_text
+    from mdfconv.reports.error_curves import DRAWN
+    from mdfconv.reports.text import csv_text, file_bytes
 
     if not 1 <= dpi <= 2400:
         raise MdfconvError("--dpi is from 1 to 2400")
     rules = _rules(method, metric, exposure)
-    names = _names(mdf) or SUBSTITUTES
+    names = one_parameter_names(mdf or DRAWN)
     folder = check_folder(output)
     scene = Scene(brdf.value, light.value, normalized, exposure, size)
     figures = {f"compare-m_b-{value:g}": value for value in m_b or ()}
     rows: list[dict[str, Any]] = []
     contents: dict[str, bytes] = {}
-    for name, value in (figures or {"fig4": 0.4, "fig5": 0.04464}).items():
+    for name, value in (figures or PAPER_FIGURES).items():
         found = compare(value, rules, scene, names)
         rows += [{"figure": name} | row for row in found.table()]
         columns, section = found.section_rows()
-        contents[f"{name}.csv"] = f"{csv_text(columns, section)}\n".encode()
+        contents[f"{name}.csv"] = file_bytes(csv_text(columns, section))
         contents[f"{name}.png"] = draw_comparison(found, dpi)
     paths = write_all(folder, contents)
     write_records(_COLUMNS, rows, format_, None, "Pictures against Beckmann's")
@@ -125,12 +127,3 @@ def _rules(method: str | None, metric: str | None, exposure: float) -> list[Rule
     if method is None and metric is None:
         return default_rules(exposure)
     return [Rule(find_method(method or "fit").name, find_metric(metric or "unit", exposure))]
-
-
-def _names(mdf: list[str] | None) -> list[str]:
-    from mdfconv.distributions import distribution
-
-    names = list(dict.fromkeys(distribution(name).name for name in mdf or ()))
-    if "ashikhmin-shirley" in names:
-        raise MdfconvError("with one parameter ashikhmin-shirley is blinn-phong: show that")
-    return names

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from mdfconv.cli.names import one_parameter_distributions
 from mdfconv.cli.output import Format, console, print_table, value_text
 from mdfconv.conversion import DEFAULT_METHOD, Conversion, explain, list_methods
 from mdfconv.conversion.endpoint import endpoint
@@ -216,13 +217,10 @@ def _targets(numbers: list[Any], source: str) -> list[str]:
     """Return the distributions that `all` stands for: those that take such values."""
     own = endpoint(source).distribution
     pairs = any(isinstance(number, tuple) for number in numbers)
+    fitting = one_parameter_distributions()
     if pairs:
-        fits = [isinstance(entry, AnisotropicDistribution) for entry in list_distributions()]
-    else:
-        # With one parameter ashikhmin-shirley is blinn-phong.
-        fits = [entry.name != "ashikhmin-shirley" for entry in list_distributions()]
-    entries = zip(list_distributions(), fits, strict=True)
-    return [entry.name for entry, fit in entries if fit and entry is not own]
+        fitting = [e for e in list_distributions() if isinstance(e, AnisotropicDistribution)]
+    return [entry.name for entry in fitting if entry is not own]
 
 
 def _convert(

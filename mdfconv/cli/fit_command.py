@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -11,7 +12,7 @@ import typer
 
 from mdfconv.cli.output import TableFormat, default_form, record_text, write_records
 from mdfconv.errors import MdfconvError
-from mdfconv.reports.text import write_files
+from mdfconv.reports.text import file_bytes, write_files
 
 if TYPE_CHECKING:
     from mdfconv.distributions import Distribution
@@ -112,7 +113,7 @@ def command(
     columns, rows = _table(results, form, separate)
     contents = {}
     if output:
-        contents[output] = f"{record_text(columns, rows, form)}\n".encode()
+        contents[output] = file_bytes(record_text(columns, rows, form))
     if png:
         contents[png] = _picture(results[0], data.name, many=samples.values.shape[1] > 1)
     write_files(contents)
@@ -228,11 +229,11 @@ def _restrict(
 
 
 def _targets(names: list[str] | None) -> list[Distribution]:
-    from mdfconv.distributions import distribution, list_distributions
+    from mdfconv.cli.names import one_parameter_distributions
+    from mdfconv.distributions import distribution
 
     if not names or "all" in [name.lower() for name in names]:
-        # With one parameter ashikhmin-shirley is blinn-phong.
-        return [entry for entry in list_distributions() if entry.name != "ashikhmin-shirley"]
+        return one_parameter_distributions()
     return list(dict.fromkeys(distribution(name) for name in names))
 
 
@@ -265,11 +266,11 @@ def _shown(rows: list[dict[str, Any]], form: TableFormat) -> list[dict[str, Any]
     """Return the records for the form: lists and nulls in JSON, text in the others."""
     if form is TableFormat.json:
         return rows
-    digits = "r" if form is TableFormat.csv else ".4g"
-    return [{key: _text(value, digits) for key, value in row.items()} for row in rows]
+    number = repr if form is TableFormat.csv else "{:.4g}".format
+    return [{key: _text(value, number) for key, value in row.items()} for row in rows]
 
 
-def _text(value: Any, digits: str) -> Any:
+def _text(value: Any, number: Callable[[float], str]) -> Any:
     if isinstance(value, list):
-        return " ".join(repr(entry) if digits == "r" else f"{entry:{digits}}" for entry in value)
+        return " ".join(map(number, value))
     return "" if value is None else value

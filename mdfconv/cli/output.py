@@ -16,6 +16,7 @@ from mdfconv.reports.text import (
     Record,
     cell_text,
     csv_text,
+    file_bytes,
     json_text,
     markdown_text,
     write_files,
@@ -72,7 +73,7 @@ def write_records(
     """
     form = form or default_form(output)
     if output is not None:
-        write_files({output: f"{record_text(columns, rows, form)}\n".encode()})
+        write_files({output: file_bytes(record_text(columns, rows, form))})
     elif form is TableFormat.table:
         print_table(_rich_table(columns, rows, title))
     else:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli.folder import check_folder, write_all
+from mdfconv.cli.names import one_parameter_names
 from mdfconv.cli.output import TableFormat, write_records
 from mdfconv.errors import MdfconvError
 
@@ -100,13 +101,10 @@ def _curves(
     points: int,
 ) -> dict[str, Curves]:
     from mdfconv.conversion import DEFAULT_METHOD
-    from mdfconv.distributions import distribution
     from mdfconv.reports.error_curves import DRAWN, PAPER_SETS, curves, parameters_for
 
-    chief = distribution(reference).name
-    names = [distribution(name).name for name in mdf or ()]
-    if "ashikhmin-shirley" in [chief, *names]:
-        raise MdfconvError("with one parameter ashikhmin-shirley is blinn-phong: draw that")
+    (chief,) = one_parameter_names([reference])
+    names = one_parameter_names(mdf or ())
     if m_b:
         names = names or [name for name in ("beckmann", *DRAWN) if name != chief]
         wanted = dict.fromkeys([chief, *names])
@@ -135,7 +133,7 @@ def _curves(
 def _files(
     name: str, found: Curves, *, png: bool, csv: bool, svg: bool, dpi: int, log: bool
 ) -> dict[str, bytes]:
-    from mdfconv.reports.text import csv_text, rounded_rows
+    from mdfconv.reports.text import file_bytes
 
     contents = {}
     title = f"{found.reference} and its substitutes ({name})"
@@ -147,7 +145,5 @@ def _files(
             picture = draw_errors(found, title, form=form, dpi=dpi, log=log)
             contents[f"{name}.{form}"] = picture
     if csv:
-        columns = {"beta_rad": found.beta, **found.errors}
-        text = csv_text(list(columns), rounded_rows(columns))
-        contents[f"{name}b.csv"] = f"{text}\n".encode()
+        contents[f"{name}b.csv"] = file_bytes(found.error_text())
     return contents

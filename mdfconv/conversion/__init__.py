@@ -17,7 +17,7 @@ from mdfconv.conversion.residual import residual
 from mdfconv.distributions.base import AnisotropicDistribution
 from mdfconv.distributions.evaluation import Array, as_operand
 from mdfconv.distributions.parameter import number_text
-from mdfconv.errors import MdfconvError, unknown_name
+from mdfconv.errors import MdfconvError, check_name, unknown_name
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.metrics import metric as find_metric
 
@@ -83,9 +83,7 @@ def find_method(name: str) -> Method:
     MdfconvError
         If the name is not known; the message offers the nearest ones.
     """
-    if not isinstance(name, str):
-        raise MdfconvError(f"a method is named by a string, not {name!r}")
-    key = name.strip().lower().replace("_", "-")
+    key = check_name("method", name).strip().lower().replace("_", "-")
     if key not in _BY_NAME:
         raise unknown_name("method", name, list(_BY_NAME))
     return _BY_NAME[key]
@@ -205,6 +203,7 @@ def explain(
     left = (np.full_like(result, np.nan),) * 2
     if errors:
         left = residual(sides[0].distribution, parameter, sides[1].distribution, result, measure)
+    route = _route(rule, *sides)
     found = []
     start = 0
     for axis in axes:
@@ -218,10 +217,10 @@ def explain(
                 result=_value(stored[rows]),
                 method=rule.name,
                 metric=measure.name,
-                route=_route(rule, *sides),
+                route=route,
                 rmse=float(left[0][rows].max()),
                 max_error=float(left[1][rows].max()),
-                **_remarks(rule, measure, parameter[rows], result[rows], *sides),
+                **_remarks(rule, measure, parameter[rows], result[rows], *sides, route),
             )
         )
     return found
@@ -234,11 +233,11 @@ def _remarks(
     result: Array,
     source: Endpoint,
     target: Endpoint,
+    route: tuple[str, ...],
 ) -> dict[str, tuple[str, ...]]:
     """Return the cautions and notes of one conversion, for `Conversion`."""
     pair = source.distribution, target.distribution
-    route = ", ".join(_route(rule, source, target))
-    by = (f"by {route}",) if route else ()
+    by = (f"by {', '.join(route)}",) if route else ()
     if same_family(*pair) or rule.is_exact(*pair):
         return {"cautions": (), "notes": ("exact: the same form", *by)}
     axes = zip(parameter.tolist(), result.tolist(), strict=True)

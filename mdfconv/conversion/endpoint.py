@@ -12,7 +12,7 @@ from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.gtr import GTR
 from mdfconv.distributions.parameter import Encoding, Parameter
-from mdfconv.errors import MdfconvError, unknown_name
+from mdfconv.errors import MdfconvError, check_name, unknown_name
 
 DEFAULT_ENCODING = "alpha"
 
@@ -78,9 +78,7 @@ def endpoint(name: str | Endpoint, gamma: float | None = None) -> Endpoint:
     """
     if isinstance(name, Endpoint):
         return name
-    if not isinstance(name, str):
-        raise MdfconvError(f"a distribution is named by a string, not {name!r}")
-    head, colon, tail = name.partition(":")
+    head, colon, tail = check_name("distribution", name).partition(":")
     found = distribution(head)
     if gamma is not None and isinstance(found, GTR):
         found = GTR(gamma)

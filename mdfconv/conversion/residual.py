@@ -9,10 +9,16 @@ from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
 
 # The number of samples behind the paper's Table 2.
-_SAMPLES = 3001
+SAMPLES = 3001
 # 4.8 β_half is 4 m_B for Beckmann, the paper's habit.
 _HALF_WIDTHS = 4.8
 _ROWS_AT_ONCE = 256
+
+
+def lobe_reach(distribution: Distribution, parameter: Array) -> Array:
+    """Return the angle up to which a lobe matters: 4.8 β_half, at most π/2, radians."""
+    reach = _HALF_WIDTHS * distribution.half_width(parameter)
+    return np.where(reach <= np.pi / 2, reach, np.pi / 2)
 
 
 def residual(
@@ -21,6 +27,7 @@ def residual(
     target: Distribution,
     result: Array,
     metric: Metric,
+    reach: Array | None = None,
 ) -> tuple[Array, Array]:
     """Compare under a metric on β from 0 to 4.8 β_half of the source, at most π/2.
 
@@ -32,14 +39,15 @@ def residual(
         Their parameters.
     metric : Metric
         Its signal is compared: D̄, D over the source's maximum, or its encoding for a screen.
+    reach : numpy.ndarray, shape (n,), optional
+        The largest angles, radians, in place of those.
 
     Returns
     -------
     rmse, max_error : numpy.ndarray, shape (n,)
         Root mean square and maximum of the difference over 3001 uniform angles.
     """
-    reach = _HALF_WIDTHS * source.half_width(parameter)
-    reach = np.where(reach <= np.pi / 2, reach, np.pi / 2)
+    reach = lobe_reach(source, parameter) if reach is None else reach
     errors = [
         _compare(source, parameter[rows], target, result[rows], reach[rows], metric)
         for rows in _blocks(parameter.size)
@@ -56,13 +64,10 @@ def _compare(
     reach: Array,
     metric: Metric,
 ) -> Array:
-    beta = reach[:, None] * np.linspace(0, 1, _SAMPLES)
+    beta = reach[:, None] * np.linspace(0, 1, SAMPLES)
     peak = source.maximum(parameter[:, None], normalized=metric.normalized)
-    signals = []
-    for distribution, values in ((source, parameter[:, None]), (target, result[:, None])):
-        scale = distribution.maximum(values, normalized=metric.normalized) / peak
-        signals.append(metric.signal(distribution.unit(beta, values) * scale))
-    difference = signals[1] - signals[0]
+    difference = metric.signal_of(target, beta, result[:, None], peak)
+    difference -= metric.signal_of(source, beta, parameter[:, None], peak)
     rmse = np.sqrt(np.mean(np.square(difference), axis=1))
     return np.stack([rmse, np.max(np.abs(difference), axis=1)])
 

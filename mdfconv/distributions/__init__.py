@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 
 from mdfconv.distributions.base import Distribution
-from mdfconv.errors import MdfconvError, unknown_name
+from mdfconv.errors import check_name, unknown_name
 
 __all__ = ["Distribution", "distribution", "list_distributions"]
 
@@ -53,9 +53,7 @@ def distribution(name: str) -> Distribution:
     >>> distribution("Trowbridge_Reitz").name
     'ggx'
     """
-    if not isinstance(name, str):
-        raise MdfconvError(f"a distribution is named by a string, not {name!r}")
-    key = name.strip().lower().translate(str.maketrans("_/ ", "---"))
+    key = check_name("distribution", name).strip().lower().translate(str.maketrans("_/ ", "---"))
     if key not in _BY_NAME:
         raise unknown_name("distribution", name, list(_BY_NAME))
     return _BY_NAME[key]

@@ -119,7 +119,7 @@ class _Problem:
             self._rows: Indices = np.arange(rows.size)
         else:
             self._quadrature, self._rows = quadrature, rows
-        self._fixed = self._breaks(self._source, self._given)
+        self._fixed = self._breaks(self._source, self._given, self._peak)
         self._cached: tuple[Array, Array, Array] | None = None
         if target.edge(np.ones(1)) is None and not metric.kinks:
             self._cached = self._sampled(np.arange(rows.size), self._fixed)
@@ -134,12 +134,14 @@ class _Problem:
 
     def scan(self, candidates: Array) -> Array:
         """Return the approximate distance for each candidate parameter, shape (n, c)."""
-        beta, weight = self._quadrature.coarse(self._rows, fine=bool(self._metric.kinks))
+        beta, weight = self._quadrature.coarse(self._rows, fine=self.has_kinks)
         weight = weight * self._metric.weight(beta)
-        wanted = self._signal(self._source, beta, self._given, self._peak)
+        wanted = self._metric.signal_of(self._source, beta, self._given, self._peak)
         shape = (*candidates.shape, beta.shape[1])
         everywhere = np.broadcast_to(beta[:, None, :], shape)
-        got = self._signal(self.target, everywhere, candidates[:, :, None], self._peak[:, :, None])
+        got = self._metric.signal_of(
+            self.target, everywhere, candidates[:, :, None], self._peak[:, :, None]
+        )
         got -= wanted[:, None, :]
         return np.einsum("ik,ijk,ijk->ij", weight, got, got)
 
@@ -171,25 +173,13 @@ class _Problem:
     def _sampled(self, index: Indices, breaks: Array) -> tuple[Array, Array, Array]:
         """Return angles, weights and the source's signal."""
         beta, weight = self._quadrature.nodes(self._rows[index], breaks)
-        wanted = self._signal(self._source, beta, self._given[index], self._peak[index])
+        wanted = self._metric.signal_of(self._source, beta, self._given[index], self._peak[index])
         return beta, weight * self._metric.weight(beta), wanted
 
-    def _signal(
-        self, distribution: Distribution, beta: Array, parameter: Array, peak: Array
-    ) -> Array:
-        normalized = self._metric.normalized
-        scale = distribution.maximum(parameter, normalized=normalized) / peak
-        value = distribution.shape(beta, parameter)
-        value *= scale
-        return self._metric.signal(value)
-
-    def _breaks(
-        self, distribution: Distribution, parameter: Array, peak: Array | None = None
-    ) -> Array:
+    def _breaks(self, distribution: Distribution, parameter: Array, peak: Array) -> Array:
         """Return the angles where the signal is not smooth, shape (n, any); 0 for none."""
         edge = distribution.edge(parameter)
         found = [np.zeros_like(parameter) if edge is None else edge * _TOWARDS_EDGE]
-        peak = self._peak if peak is None else peak
         maximum = distribution.maximum(parameter, normalized=self._metric.normalized)
         mode = distribution.mode(parameter)
         for kink in self._metric.kinks:
@@ -229,10 +219,8 @@ def _fit_block(problem: _Problem) -> tuple[Array, Array, Array]:
         if not problem.target.parameter.upper_closed:
             ends = np.minimum(ends, scanned[:, -1])
         best = np.where(ends < _LOWER * distance, np.nan, best)
-        at_limit = np.zeros(problem.size, dtype=bool)
-        upper = problem.target.parameter.upper
-        if problem.target.parameter.upper_closed:
-            at_limit = best == upper
+        wanted = problem.target.parameter
+        at_limit = (best == wanted.upper) & wanted.upper_closed
     return best, distance, at_limit
 
 

@@ -11,9 +11,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import Parameter
-from mdfconv.errors import MdfconvError, unknown_name
+from mdfconv.errors import check_name, unknown_name
 
 # The sRGB encoding (IEC 61966-2-1) is linear up to here.
 _SRGB_TOE = 0.0031308
@@ -50,6 +51,15 @@ class Metric(ABC):
     def signal_slope(self, value: Array) -> Array | float:
         """Return dS/d(D/P)."""
         return 1.0
+
+    def signal_of(
+        self, distribution: Distribution, beta: Array, parameter: Array, peak: Array
+    ) -> Array:
+        """Return S of a distribution for P = `peak`; `beta` has the shape of the result."""
+        with np.errstate(all="ignore"):
+            value = distribution.shape(beta, parameter)
+            value *= distribution.maximum(parameter, normalized=self.normalized) / peak
+        return self.signal(value)
 
 
 class Unit(Metric):
@@ -141,9 +151,7 @@ def metric(name: str | Metric, exposure: float = 1.0) -> Metric:
     """
     if isinstance(name, Metric):
         return name
-    if not isinstance(name, str):
-        raise MdfconvError(f"a metric is named by a string, not {name!r}")
-    key = name.strip().lower()
+    key = check_name("metric", name).strip().lower()
     if key not in _METRICS:
         raise unknown_name("metric", name, list(_METRICS))
     return _METRICS[key](exposure)

@@ -13,13 +13,13 @@ from mdfconv.conversion import convert
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import list_metrics, metric
 from mdfconv.reports.closed_forms import refit
-from mdfconv.reports.comparison import Scene, default_rules
+from mdfconv.reports.comparison import PAPER_FIGURES, Scene, default_rules
 from mdfconv.reports.comparison import compare as compare_pictures
 from mdfconv.reports.comparison_figure import draw_comparison
 from mdfconv.reports.error_curves import PAPER_SETS, curves
 from mdfconv.reports.error_figure import draw_errors
 from mdfconv.reports.table2 import COLUMNS, compare, fit_table, paper_sweep
-from mdfconv.reports.text import csv_text, markdown_text, rounded_rows, write_files
+from mdfconv.reports.text import csv_text, file_bytes, markdown_text, write_files
 
 Files = dict[str, bytes]
 
@@ -46,14 +46,10 @@ class Artefact:
     command: str
 
 
-def _text(text: str) -> bytes:
-    return f"{text}\n".encode()
-
-
 def table2() -> Artefact:
     """Return Table 2 and the comparison with the printed one."""
     rows = fit_table(*paper_sweep(), metric("unit"))
-    cells = [asdict(cell) for cell in compare()]
+    cells = [asdict(cell) for cell in compare(rows)]
     agreeing = sum(cell["agrees"] for cell in cells)
     columns = list(cells[0])
     page = "\n".join(
@@ -73,7 +69,7 @@ def table2() -> Artefact:
         ]
     )
     return Artefact(
-        {"table2.csv": _text(csv_text(COLUMNS, rows)), "table2.md": _text(page)},
+        {"table2.csv": file_bytes(csv_text(COLUMNS, rows)), "table2.md": file_bytes(page)},
         "Sawicki 2021, Table 2",
         f"{agreeing} of {len(cells)} cells within 4e-4 relative; the others are explained",
         "mdfconv fit-table --compare",
@@ -85,9 +81,9 @@ def other_metrics() -> Artefact:
     files: Files = {}
     for name in list_metrics()[1:]:
         rows = fit_table(*paper_sweep(), metric(name))
-        files[f"table2-{name}.csv"] = _text(csv_text(COLUMNS, rows))
+        files[f"table2-{name}.csv"] = file_bytes(csv_text(COLUMNS, rows))
         page = f"# Table 2 under the {name} metric\n\n{markdown_text(COLUMNS, rows)}"
-        files[f"table2-{name}.md"] = _text(page)
+        files[f"table2-{name}.md"] = file_bytes(page)
     return Artefact(
         files,
         "Table 2 for those who keep the light (energy) or the picture (display, exposure 1)",
@@ -127,7 +123,10 @@ def closed_forms() -> Artefact:
         ]
     )
     return Artefact(
-        {"closed-forms.csv": _text(csv_text(columns, rows)), "closed-forms.md": _text(page)},
+        {
+            "closed-forms.csv": file_bytes(csv_text(columns, rows)),
+            "closed-forms.md": file_bytes(page),
+        },
         "Sawicki 2021, equations (12)-(15), Tables 3 and 4",
         f"the printed coefficients are within {100 * worst:.2g} % of the unit table",
         "mdfconv fit-table --closed-forms",
@@ -146,11 +145,10 @@ def error_figures() -> Artefact:
     rows: list[dict[str, object]] = []
     for name, given in PAPER_SETS.items():
         found = curves(given, "beckmann", metric("unit"), 1001)
-        columns = {"beta_rad": found.beta, **found.errors}
         files[f"{name}.png"] = draw_errors(found, f"Sawicki 2021, {name}", dpi=_FIGURE_DPI)
-        files[f"{name}b.csv"] = _text(csv_text(list(columns), rounded_rows(columns)))
+        files[f"{name}b.csv"] = file_bytes(found.error_text())
         rows += [{"figure": name} | row for row in found.maxima()]
-    files["errors.md"] = _text(
+    files["errors.md"] = file_bytes(
         "\n".join(
             [
                 "# Largest errors in Figures 1 and 2 of Sawicki 2021",
@@ -201,11 +199,11 @@ def pictures() -> Artefact:
     files: Files = {}
     rows: list[dict[str, object]] = []
     scene = Scene(size=_PICTURE_SIZE)
-    for name, m_b in (("fig4", 0.4), ("fig5", 0.04464)):
+    for name, m_b in PAPER_FIGURES.items():
         found = compare_pictures(m_b, default_rules(scene.exposure), scene)
         columns, section = found.section_rows()
         files[f"{name}.png"] = draw_comparison(found, _FIGURE_DPI)
-        files[f"{name}.csv"] = _text(csv_text(columns, section))
+        files[f"{name}.csv"] = file_bytes(csv_text(columns, section))
         rows += [{"figure": name} | row for row in found.table()]
     page = "\n".join(
         [
@@ -220,7 +218,7 @@ def pictures() -> Artefact:
             markdown_text(list(rows[0]), rows),
         ]
     )
-    files["pictures.md"] = _text(page)
+    files["pictures.md"] = file_bytes(page)
     return Artefact(
         files,
         "Sawicki 2021, Figures 3 to 5: one sphere, the distributions exchanged",
@@ -263,7 +261,7 @@ def build(folder: Path) -> Iterator[Artefact]:
         write_files({folder / name: content for name, content in artefact.files.items()})
         done.append(artefact)
         yield artefact
-    write_files({folder / "README.md": _text(_index(done))})
+    write_files({folder / "README.md": file_bytes(_index(done))})
 
 
 def _index(artefacts: list[Artefact]) -> str:

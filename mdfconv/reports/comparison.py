@@ -9,16 +9,18 @@ from typing import Any
 import numpy as np
 
 from mdfconv.conversion import convert
+from mdfconv.conversion.residual import lobe_reach
 from mdfconv.distributions import distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric, srgb
+from mdfconv.reports.error_curves import DRAWN
 from mdfconv.reports.sphere import Frame, cross_section, lights, microfacet, radiance
 from mdfconv.reports.text import rounded_rows
 
-SUBSTITUTES = ("blinn-phong", "gauss", "ggx", "sawicki", "schlick")
 _SECTION_POINTS = 401
-_SECTION_WIDTHS = 4.8  # half widths of the reference
+# Sawicki 2021, captions of Figures 4 and 5: the surfaces of Figures 1 and 2.
+PAPER_FIGURES = {"fig4": 0.4, "fig5": 0.04464}
 
 
 @dataclass(frozen=True)
@@ -158,7 +160,7 @@ class Comparison:
 
 
 def compare(
-    m_b: float, rules: Sequence[Rule], scene: Scene, names: Sequence[str] = SUBSTITUTES
+    m_b: float, rules: Sequence[Rule], scene: Scene, names: Sequence[str] = DRAWN
 ) -> Comparison:
     """Render Beckmann and its substitutes.
 
@@ -190,7 +192,7 @@ def compare(
         ]
         for rule in rules
     }
-    reach = _SECTION_WIDTHS * float(distribution("beckmann").half_width(parameter))
+    reach = float(lobe_reach(distribution("beckmann"), np.asarray(parameter)))
     position, normals = cross_section(_SECTION_POINTS, min(reach, 1.0))
     reference = _render("beckmann", parameter, scene, normals, 1.0)
     if reference.image.max() < 0.5 * reference.section.max():

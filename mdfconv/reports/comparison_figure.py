@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mdfconv.distributions import distribution
+from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import srgb
 from mdfconv.reports.comparison import Comparison, Rendering
 from mdfconv.reports.figures import encoded, line_style, pyplot
@@ -45,17 +46,22 @@ def draw_comparison(found: Comparison, dpi: int = 120) -> bytes:
         f"{scene.exposure:g} (1: the peak of Beckmann is white)",
         fontsize=10,
     )
+    coverage = Frame(scene.size).normals()[1].reshape(found.reference.image.shape)
     panels = top.subplots(len(rows), columns, squeeze=False)
     for line, (rule, renderings) in zip(panels, rows, strict=True):
         for axes in line:
             axes.axis("off")
-        _picture(line[0], found, found.reference, f"beckmann\n{found.reference.parameter:.4g}")
+        _picture(
+            line[0], found, coverage, found.reference, f"beckmann\n{found.reference.parameter:.4g}"
+        )
         line[0].text(
             -0.04, 0.5, rule, rotation=90, ha="right", va="center", transform=line[0].transAxes
         )
         for axes, entry in zip(line[1:], renderings, strict=False):
             symbol = distribution(entry.name).parameter.symbol
-            _picture(axes, found, entry, f"{entry.name}\n{symbol} = {entry.parameter:.4g}")
+            _picture(
+                axes, found, coverage, entry, f"{entry.name}\n{symbol} = {entry.parameter:.4g}"
+            )
     sections = bottom.subplots(1, len(rows), sharey=True, squeeze=False)[0]
     for axes, (rule, renderings) in zip(sections, rows, strict=True):
         _section(axes, found, rule, renderings)
@@ -64,9 +70,7 @@ def draw_comparison(found: Comparison, dpi: int = 120) -> bytes:
     return encoded(figure, dpi=dpi)
 
 
-def _picture(axes: Any, found: Comparison, entry: Rendering, label: str) -> None:
-    frame = Frame(found.scene.size)
-    coverage = frame.normals()[1].reshape(entry.image.shape)
+def _picture(axes: Any, found: Comparison, coverage: Array, entry: Rendering, label: str) -> None:
     shown = srgb(found.scene.exposure * entry.image + (1 - coverage) * _BACKGROUND)
     axes.imshow(shown, cmap="gray", vmin=0, vmax=1, interpolation="antialiased")
     axes.set_title(label, fontsize=7.5, pad=3)

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from mdfconv.conversion import convert
+from mdfconv.conversion.residual import lobe_reach
 from mdfconv.distributions import distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
+from mdfconv.reports.text import csv_text, rounded_rows
 
 # Sawicki 2021, captions of Figures 1 and 2.
 PAPER_SETS: Mapping[str, Mapping[str, float]] = {
@@ -26,7 +28,6 @@ PAPER_SETS: Mapping[str, Mapping[str, float]] = {
     },
 }  # fmt: skip
 DRAWN = ("blinn-phong", "gauss", "ggx", "sawicki", "schlick")
-_HALF_WIDTHS = 4.8
 _MOST_POINTS = 1_000_000
 
 
@@ -58,6 +59,11 @@ class Curves:
     def reference(self) -> str:
         """The name of the distribution that the others are compared with."""
         return next(iter(self.parameters))
+
+    def error_text(self) -> str:
+        """Return the errors as CSV: beta_rad, then a column a distribution."""
+        columns = {"beta_rad": self.beta, **self.errors}
+        return csv_text(list(columns), rounded_rows(columns))
 
     def maxima(self) -> list[dict[str, Any]]:
         """Return for each distribution the largest |error| and where it occurs."""
@@ -100,14 +106,12 @@ def curves(parameters: Mapping[str, float], reference: str, metric: Metric, poin
         raise MdfconvError(f"the number of points is from 2 to {_MOST_POINTS}")
     entry = distribution(reference)
     given = np.array([parameters[reference]])
-    reach = _HALF_WIDTHS * float(entry.half_width(given)[0])
-    beta = np.linspace(0, reach if reach < np.pi / 2 else np.pi / 2, points)
-    peak = float(entry.maximum(given, normalized=metric.normalized)[0])
-    values = {}
-    for name in [reference, *(name for name in parameters if name != reference)]:
-        other = distribution(name)
-        height = other.maximum(np.array([parameters[name]]), normalized=metric.normalized)[0]
-        values[name] = metric.signal(other.unit(beta, parameters[name]) * (height / peak))
+    beta = np.linspace(0, float(lobe_reach(entry, given)[0]), points)
+    peak = entry.maximum(given, normalized=metric.normalized)
+    values = {
+        name: metric.signal_of(distribution(name), beta, np.array([float(parameters[name])]), peak)
+        for name in dict.fromkeys([reference, *parameters])
+    }
     top = values[reference].max()
     errors = {
         name: (value - values[reference]) / top

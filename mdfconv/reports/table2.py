@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.conversion.residual import residual
+from mdfconv.conversion.residual import SAMPLES, residual
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
@@ -23,7 +23,6 @@ from mdfconv.fitting.core import fit
 from mdfconv.fitting.metrics import Metric, Unit
 from mdfconv.fitting.quadrature import UniformSamples
 
-SAMPLES = 3001
 AGREEMENT = 4e-4  # relative
 _LOBE_REACH = 4.0  # β up to 4 m_B, the paper's habit
 _BATCH = 64
@@ -144,10 +143,9 @@ def fit_table(
     return found
 
 
-def compare() -> Iterator[Cell]:
-    """Yield the 153 printed parameters and errors beside ours."""
-    m_b, reach = paper_sweep()
-    ours = fit_table(m_b, reach, Unit())
+def compare(ours: list[Row] | None = None) -> Iterator[Cell]:
+    """Yield the 153 printed parameters and errors beside ours, fitted anew if not given."""
+    ours = fit_table(*paper_sweep(), Unit()) if ours is None else ours
     for printed, row in zip(printed_rows(), ours, strict=True):
         for column in COLUMNS[2:]:
             yield _cell(printed["m_b"], column, printed[column], row[column])
@@ -190,11 +188,7 @@ def _check_answers(m_b: Array, found: Array, name: str) -> None:
 
 def _error_of_eq11(m_b: Array, n: Array, reach: Array, metric: Metric) -> Array:
     source, target = distribution("beckmann"), distribution("blinn-phong")
-    if metric.name != "unit":
-        return residual(source, m_b, target, n, metric)[0]
-    beta = reach[:, None] * np.linspace(0, 1, SAMPLES)
-    difference = target.unit(beta, n[:, None]) - source.unit(beta, m_b[:, None])
-    return np.sqrt(np.mean(np.square(difference), axis=1))
+    return residual(source, m_b, target, n, metric, reach if metric.name == "unit" else None)[0]
 
 
 def _gtr_columns(m_b: Array, metric: Metric, samples: UniformSamples | None) -> dict[str, Array]:

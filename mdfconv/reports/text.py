@@ -63,6 +63,11 @@ def markdown_text(columns: Sequence[str], rows: Sequence[Record]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
+def file_bytes(text: str) -> bytes:
+    """Return text as the content of a file."""
+    return f"{text}\n".encode()
+
+
 def write_files(contents: Mapping[Path, bytes]) -> None:
     """Write files whole or not at all: all beside their places first, then renamed.
 

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.output import TableFormat, default_form, record_text, write_records
+from mdfconv.cli.output import (
+    FileOption,
+    FormOption,
+    TableFormat,
+    default_form,
+    record_text,
+    write_records,
+)
 from mdfconv.errors import MdfconvError
 from mdfconv.reports.text import file_bytes, write_files
 
@@ -77,13 +84,8 @@ def command(
         float,
         typer.Option(metavar="T", help="How much worse than the best the simplest may be."),
     ] = 0.05,
-    format_: Annotated[
-        TableFormat | None,
-        typer.Option("--format", help="Form of the output: table on a terminal, csv in a pipe."),
-    ] = None,
-    output: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write to a file instead.")
-    ] = None,
+    format_: FormOption = None,
+    output: FileOption = None,
     png: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw data, fits and residuals.")
     ] = None,

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.output import TableFormat, write_records
+from mdfconv.cli.output import FileOption, FormOption, progress, write_records
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
@@ -19,13 +17,8 @@ _LARGEST_SWEEP = 100_000
 
 
 def command(
-    format_: Annotated[
-        TableFormat | None,
-        typer.Option("--format", help="Form of the output: table on a terminal, csv in a pipe."),
-    ] = None,
-    output: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write to a file instead.")
-    ] = None,
+    format_: FormOption = None,
+    output: FileOption = None,
     compare: Annotated[
         bool,
         typer.Option("--compare", help="Put each printed cell of the paper beside ours."),
@@ -139,19 +132,8 @@ def _table(
     from mdfconv.reports.table2 import COLUMNS, EXTENDED_COLUMNS, fit_table
 
     values, reach = _sweep(sweep, m_b)
-    from rich.console import Console
-    from rich.progress import Progress
-
-    err = Console(stderr=True)
-    with Progress(console=err, transient=True, disable=not sys.stderr.isatty()) as bar:
-        task = bar.add_task("Fitting", total=values.size)
-        rows = fit_table(
-            values,
-            reach,
-            measure,
-            extended=extended,
-            progress=lambda done: bar.advance(task, done),
-        )
+    with progress("Fitting", values.size) as advance:
+        rows = fit_table(values, reach, measure, extended=extended, progress=advance)
     columns = [*COLUMNS, *(EXTENDED_COLUMNS if extended else ())]
     return columns, rows, f"Fits of Beckmann, metric {measure.name}"
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -47,6 +48,16 @@ class TableFormat(StrEnum):
     markdown = "markdown"
 
 
+# Options that several commands share.
+FormOption = Annotated[
+    TableFormat | None,
+    typer.Option("--format", help="Form of the output: table on a terminal, csv in a pipe."),
+]
+FileOption = Annotated[
+    Path | None, typer.Option("--output", metavar="FILE", help="Write to a file instead.")
+]
+
+
 def value_text(value: float | tuple[float, ...]) -> str:
     """Return a number, or a pair with a comma, in ten significant digits."""
     return ",".join(map(number_text, value if isinstance(value, tuple) else (value,)))
@@ -78,6 +89,18 @@ def write_records(
         print_table(_rich_table(columns, rows, title))
     else:
         typer.echo(record_text(columns, rows, form))
+
+
+@contextmanager
+def progress(description: str, total: int) -> Iterator[Callable[[int], None]]:
+    """Show a bar on a terminal, nothing in a pipe; yield what advances it."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    err = Console(stderr=True)
+    with Progress(console=err, transient=True, disable=not sys.stderr.isatty()) as bar:
+        task = bar.add_task(description, total=total)
+        yield lambda steps: bar.advance(task, steps)
 
 
 def record_text(columns: Sequence[str], rows: Sequence[Record], form: TableFormat) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from mdfconv.cli.output import progress
 
 
 def command(
@@ -22,16 +23,11 @@ def command(
 
     mdfconv report --output /tmp/mdfconv-report
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
     from mdfconv.reports.build import COUNT, build
 
     written: list[str] = []
-    err = Console(stderr=True)
-    with Progress(console=err, transient=True, disable=not sys.stderr.isatty()) as bar:
-        task = bar.add_task("Report", total=COUNT)
+    with progress("Report", COUNT) as advance:
         for artefact in build(output):
             written += [str(output / name) for name in artefact.files]
-            bar.advance(task)
+            advance(1)
     typer.echo("\n".join([*written, str(output / "README.md")]))

@@ -25,12 +25,16 @@ _WIDE = np.geomspace(1.02, 1e5, 26)
 _BEYOND = 1.3
 _WIDEST_TANGENT = 20.0
 _MINIMA = 3
+# Columns of the scan on either side of its minimum.
+_REACH = 2
+_RECENTRINGS = 40
 _STEPS = 80
 _NEARLY = 2.0
 _LOWER = 0.98
-# In ln p. A secant step of the first size leaves an error far below it, a bisection does not.
+# In ln p. A secant step of the first size leaves an error far below it; a bisection does not, nor
+# does the Gauss-Newton step at the start, whose curvature is not that of the distance.
 _SECANT_TOLERANCE = 1e-6
-_BISECTION_TOLERANCE = 1e-10
+_LINEAR_TOLERANCE = 1e-10
 _AT_END = 1e-7
 _BISECTIONS = 60
 # An encoding for a screen rises like a root where a distribution leaves 0.
@@ -233,7 +237,7 @@ def _candidates(problem: _Problem) -> Array:
     tangents = problem.tangent[:, None] * np.append(multiples, 1e6)
     scaled = target.from_half_tangent(np.minimum(tangents, 1e8))
     # Exponents fall as lobes widen.
-    falls = np.nanmin(scaled) < scaled[0, 0]
+    falls = np.nanmin(scaled[0]) < scaled[0, 0]
     widest = (np.nanmin if falls else np.nanmax)(scaled, axis=1, keepdims=True)
     wide = widest / _WIDE if falls else widest * _WIDE
     if target.parameter.upper_closed:
@@ -266,25 +270,40 @@ def _refine(
     best = np.full(problem.size, np.nan)
     value = np.full(problem.size, np.inf)
     active = np.flatnonzero(column >= 0)
-    if active.size == 0:
-        return best, value
     last = candidates.shape[1] - 1
-    steps = np.arange(-2, 3)
-    places = np.clip(column[active, None] + steps, 0, last)
-    around = np.log(candidates[active[:, None], places])
-    start = _vertex(around[:, 1:4], scanned[active[:, None], places[:, 1:4]])
-    root, value[active] = _stationary(problem, around[:, 0], around[:, 4], start, active)
-    # Sliding down to the end of the scan means that there is no minimum before it, unless the
-    # end belongs to the legal range.
-    slid_up = root >= np.log(candidates[active, -1]) - _AT_END
-    slid_down = root <= np.log(candidates[active, 0]) + _AT_END
-    chosen = np.exp(root)
-    if problem.target.parameter.upper_closed:
-        chosen[slid_up] = problem.target.parameter.upper
-    else:
-        chosen[slid_up] = np.nan
-    chosen[slid_down] = np.nan
-    best[active] = chosen
+    steps = np.arange(-_REACH, _REACH + 1)
+    for _ in range(_RECENTRINGS):
+        if active.size == 0:
+            break
+        places = np.clip(column[active, None] + steps, 0, last)
+        around = np.log(candidates[active[:, None], places])
+        start = _vertex(around[:, 1:4], scanned[active[:, None], places[:, 1:4]])
+        low, high = around[:, 0], around[:, -1]
+        root, value[active] = _stationary(problem, low.copy(), high.copy(), start, active)
+        best[active] = np.exp(root)
+        # Where the approximate scan was out by more than the bracket, go on from its end.
+        down, up = root <= low + _AT_END, root >= high - _AT_END
+        shift = _REACH * (up.astype(int) - down.astype(int))
+        moved = np.clip(column[active] + shift, 0, last)
+        previous, column = column[active], column.copy()
+        column[active] = moved
+        active = active[moved != previous]
+    return _without_open_ends(problem, candidates, best, value)
+
+
+def _without_open_ends(
+    problem: _Problem, candidates: Array, best: Array, value: Array
+) -> tuple[Array, Array]:
+    """Return minima without those at the ends of the scan, which belong to no legal range.
+
+    Sliding down to the end of the scan means that there is no minimum before it, unless the
+    end is part of the legal range.
+    """
+    slid_up = best >= candidates[:, -1] * (1 - _AT_END)
+    slid_down = best <= candidates[:, 0] * (1 + _AT_END)
+    upper = problem.target.parameter.upper
+    best[slid_up] = upper if problem.target.parameter.upper_closed else np.nan
+    best[slid_down] = np.nan
     value[np.isnan(best)] = np.inf
     return best, value
 
@@ -316,16 +335,19 @@ def _stationary(
         low = np.where(slope < 0, x, lower[active])
         high = np.where(slope >= 0, x, upper[active])
         if previous is None:
-            step = -slope / curvature
+            step, tolerance = -slope / curvature, np.full_like(x, _LINEAR_TOLERANCE)
         else:
             step = -slope * (x - previous[0]) / (slope - previous[1])
+            # Towards a closed end the distance bends on the scale of what is left to it.
+            left = 1 - np.exp(x) / problem.target.parameter.upper
+            tolerance = np.maximum(_SECANT_TOLERANCE * left, _LINEAR_TOLERANCE)
         safe = (x + step > low) & (x + step < high) & (np.abs(step) < 0.7 * last_step[active])
         step = np.where(safe, step, 0.5 * (low + high) - x)
         step = np.where(slope == 0, 0, step)
         distance[active] += slope * step
         lower[active], upper[active], last_step[active] = low, high, np.abs(step)
         root[active] = x + step
-        going = np.abs(step) > np.where(safe, _SECANT_TOLERANCE, _BISECTION_TOLERANCE)
+        going = np.abs(step) > np.where(safe, tolerance, _LINEAR_TOLERANCE)
         previous = x[going], slope[going]
         active = active[going]
         if active.size == 0:

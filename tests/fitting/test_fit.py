@@ -275,3 +275,29 @@ def test_errors_follow_the_metric():
         ]
         # The metric's weight differs from the uniform one of the error, so not by much.
         assert row.rmse <= min(others) * 1.1
+
+
+@pytest.mark.parametrize(("source", "target"), [("ggx", "gauss"), ("schlick", "blinn-phong")])
+def test_a_value_is_fitted_alike_in_every_batch(source, target):
+    values = np.array([0.95, 0.2, 0.01, 0.6])
+    ends = mdfconv.distribution(source), mdfconv.distribution(target)
+    alone = [fit(ends[0], values[i : i + 1], ends[1], Unit()).parameter[0] for i in range(4)]
+    for order in (slice(None), slice(None, None, -1)):
+        together = fit(ends[0], values[order], ends[1], Unit()).parameter
+        assert together == pytest.approx(np.array(alone)[order], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "x"),
+    [
+        # The start lies so near the minimum that the first step looks like the last.
+        ("ggx", "schlick", 0.9598171117924416),
+        # The scan does not see Schlick's edge: the minimum is outside its bracket.
+        ("schlick", "gauss", 0.9384743),
+    ],
+)
+def test_the_fit_is_smooth_where_its_search_is_hard(source, target, x):
+    around = x + 1e-4 * np.arange(-2, 3)
+    ends = mdfconv.distribution(source), mdfconv.distribution(target)
+    got = fit(ends[0], around, ends[1], Unit()).parameter
+    assert abs(np.diff(got, 4)[0]) < 5e-8

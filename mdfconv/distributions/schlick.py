@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from mdfconv.distributions.base import Distribution
@@ -11,6 +13,7 @@ from mdfconv.distributions.parameter import Parameter
 
 # Where y = x/m is smaller than this, 1 − w is a difference of numbers that agree in too many digits
 # for the type at hand.
+_JUST_BEYOND = 1 + 1e-6
 _EDGE = {np.dtype(np.float32): 1e-2, np.dtype(np.float64): 5e-4}
 
 
@@ -34,21 +37,30 @@ class Schlick(Distribution):
     operations = 8
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
+        # Angles often come sorted or in tiles: of whole blocks beyond the edge nothing is computed.
+        if out is not None and beta.min() > _JUST_BEYOND * np.max(self.edge(parameter)):
+            out.fill(0)
+            return out
         # tan²(β/2)/(1+tan²(β/2)) = ½ (1 − cos β)
-        w = tangent_square(0.5 * beta)
-        w /= 1 + w
+        w = np.multiply(beta, 0.5)
+        tangent_square(w, w)
+        fall = w + 1
+        w /= fall
         w *= 2 / parameter
         y = np.subtract(1, w, out=out)
-        _sharpen_edge(y, beta, parameter)
-        np.maximum(y, 0, out=y)
-        np.minimum(w, 1, out=w)
-        fall = 2 - w
+        if _sharpen_edge(y, beta, parameter):
+            # Against arrays, not against numbers: NumPy has a fast loop for that.
+            np.maximum(y, np.zeros_like(y), out=y)
+            np.minimum(w, np.ones_like(w), out=w)
+        fall = np.subtract(2, w, out=fall)
         fall *= w
         fall *= (1 - parameter) / parameter
         fall += 1
         np.square(fall, out=fall)
         # cos β from y, not from the tangent: at m = 1 the two cancel to the last bit.
-        fall *= (1 - parameter) + y * parameter
+        cosine = np.multiply(y, parameter, out=w)
+        cosine += 1 - parameter
+        fall *= cosine
         y /= fall
         return y
 
@@ -80,19 +92,38 @@ class Schlick(Distribution):
         return alpha
 
 
-def _sharpen_edge(y: Array, beta: Array, parameter: Array) -> None:
-    """Recompute y = x/m where it nearly vanishes, in place and to working precision."""
+def _sharpen_edge(y: Array, beta: Array, parameter: Array) -> bool:
+    """Recompute y = x/m where it nearly vanishes, in place and to working precision.
+
+    Returns whether it is nearly 0, negative or NaN anywhere.
+    """
     threshold = _EDGE[y.dtype]
-    if not (y.min() < threshold and y.max() > -threshold):
-        return
+    if y.min() >= threshold:
+        return False
     near = np.abs(y) < threshold
-    angle, m = (np.broadcast_to(a, y.shape)[near].astype(float) for a in (beta, parameter))
     # Rounded to float32, π/2 exceeds π/2.
-    angle = np.minimum(np.abs(angle), np.pi / 2)
+    angle = np.minimum(np.abs(beta[near]).astype(float), np.pi / 2)
+    single = parameter.size == 1
+    m = parameter.ravel() if single else np.broadcast_to(parameter, y.shape)[near]
     if y.dtype == np.float64:
-        y[near] = distance_to_cosine(angle, m) / m
+        edge, rest = _edge_of(float(m[0])) if single else _precise_edge(m)
+        # x = cos β − cos β_edge
+        x = 2 * np.sin(0.5 * (edge - angle + rest)) * np.sin(0.5 * (edge + angle))
+        y[near] = x / m
     else:
-        y[near] = 1 - 2 * np.square(np.sin(0.5 * angle)) / m
+        y[near] = 1 - 2 * np.square(np.sin(0.5 * angle)) / m.astype(float)
+    return True
+
+
+def _precise_edge(m: Array) -> tuple[Array, Array]:
+    """Return the end of the support in two parts, to twice the working precision."""
+    edge = 2 * np.arcsin(np.sqrt(0.5 * m))
+    return edge, distance_to_cosine(edge, m) / np.sin(edge)
+
+
+@lru_cache(maxsize=64)
+def _edge_of(m: float) -> tuple[Array, Array]:
+    return _precise_edge(np.array([m]))
 
 
 DISTRIBUTION = Schlick()

@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test report clean
+.PHONY: demo test report bench data clean
 demo: $(VENV)/installed
 	$(BIN)/mdfconv convert --from beckmann --to ggx 0.2 --format table
 
@@ -15,6 +15,17 @@ test: $(VENV)/installed-test
 
 report: $(VENV)/installed
 	$(BIN)/mdfconv report --output reports
+
+# Times of this machine, as reports/speed-error.*
+bench: $(VENV)/installed
+	$(BIN)/mdfconv bench --format markdown --csv reports/speed-error.csv \
+	  --png reports/speed-error.png > reports/speed-error.tmp
+	mv reports/speed-error.tmp reports/speed-error.md
+
+# The stored polynomials of the method fast, and the 50-digit values of the audit: minutes.
+data: $(VENV)/installed-test
+	$(BIN)/python -m tests.generate_fast
+	$(BIN)/python -m tests.generate_stability
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

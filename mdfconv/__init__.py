@@ -9,7 +9,7 @@ Examples
 
 from mdfconv.conversion import Conversion, convert, explain, list_methods
 from mdfconv.distributions import Distribution, distribution, list_distributions
-from mdfconv.errors import MdfconvError
+from mdfconv.errors import MdfconvError, MdfconvWarning
 
 __version__ = "0.1.0"
 
@@ -17,6 +17,7 @@ __all__ = [
     "Conversion",
     "Distribution",
     "MdfconvError",
+    "MdfconvWarning",
     "__version__",
     "convert",
     "distribution",

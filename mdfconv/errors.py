@@ -1,6 +1,10 @@
 """The one family of errors that mdfconv raises at its border."""
 
 
+class MdfconvWarning(UserWarning):
+    """Elements of an array that have no answer and come back as NaN."""
+
+
 class MdfconvError(ValueError):
     """A request that cannot be answered; the message is written for the user.
 

@@ -49,16 +49,17 @@ def half_width(name, p, gamma=2):
     return low
 
 
-def from_half_width(name, beta_half):
+def from_half_width(name, beta_half, gamma=2):
     """Return the parameter with that β_half by bisection at 50 digits, None if there is none."""
     low, high = (mp.mpf("1e-8"), mp.mpf("1e17")) if name in EXPONENTS else ("1e-17", UPPER[name])
     low, high = mp.mpf(low), mp.mpf(high)
     rising = name not in EXPONENTS
-    if (excess_mp(name, beta_half, high, 2) > 0) != rising:
+    low_is_wide, high_is_wide = (excess_mp(name, beta_half, p, gamma) > 0 for p in (low, high))
+    if high_is_wide != rising or low_is_wide == rising:
         return None
     for _ in range(250):
         middle = mp.sqrt(low * high)
-        if (excess_mp(name, beta_half, middle, 2) > 0) == rising:
+        if (excess_mp(name, beta_half, middle, gamma) > 0) == rising:
             high = middle
         else:
             low = middle
@@ -66,7 +67,7 @@ def from_half_width(name, beta_half):
 
 
 EXPONENTS = ("blinn-phong", "sawicki")
-UPPER = {"beckmann": 100, "gauss": 100, "ggx": 1, "schlick": 1, "smoothie": 1e6}
+UPPER = {"beckmann": 100, "gauss": 100, "ggx": 1, "gtr": 1, "schlick": 1, "smoothie": 1e6}
 
 
 def excess_mp(name, beta, p, gamma):
@@ -92,6 +93,37 @@ def ratio_mp(name, beta, p, gamma):
         "smoothie": lambda: (p**2 / (p**2 + 4 * s**2)) ** 2,
     }
     return ratio[name]()
+
+
+def maximum(name, p):
+    """Return max D(β)/D(0)."""
+    p = mp.mpf(p)
+    off_axis = name == "beckmann" and 2 * p * p > 1
+    return 4 * p**4 * mp.exp(1 / p**2 - 2) if off_axis else mp.mpf(1)
+
+
+def at_normal(name, p, gamma=2):
+    """Return D(0) of the normalized form; for the Gaussian by quadrature."""
+    p, gamma = mp.mpf(p), mp.mpf(gamma)
+    if name in ("beckmann", "ggx", "schlick"):
+        return 1 / (mp.pi * p**2)
+    if name == "gauss":
+        ends = [step * p for step in (0, 1, 2, 4, 8, 12, 16) if step * p < HALF_PI]
+        if len(ends) < 7:
+            ends.append(HALF_PI)
+        return 1 / (mp.pi * mp.quad(lambda b: mp.exp(-((b / p) ** 2)) * mp.sin(2 * b), ends))
+    if name == "gtr":
+        if p == 1:
+            return 1 / mp.pi
+        bottom = mp.log(p**2) if gamma == 1 else (1 - p ** (2 - 2 * gamma)) / (gamma - 1)
+        return (p**2 - 1) / (mp.pi * bottom * p ** (2 * gamma))
+    if name == "blinn-phong":
+        return (p + 2) / (2 * mp.pi)
+    if name == "sawicki":
+        return 3 * (3 + p) / (8 * mp.pi)
+    if name == "smoothie":
+        return (p**2 + 4) / (mp.pi * p**2)
+    raise KeyError(name)
 
 
 def relative_error(value, exact):

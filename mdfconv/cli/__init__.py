@@ -20,12 +20,16 @@ from mdfconv.errors import MdfconvError, unknown_name
 
 _COMMANDS = (
     "convert",
+    "formula",
     "list",
     "fit",
     "fit-table",
     "plot-error",
     "compare",
     "report",
+    "bench",
+    "recommend",
+    "stability",
 )
 
 # A value may be negative, which looks like an option: `_Command` sorts out the real typos.

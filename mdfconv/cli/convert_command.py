@@ -10,7 +10,7 @@ import typer
 
 from mdfconv.cli.names import one_parameter_distributions
 from mdfconv.cli.output import Format, console, print_table, value_text
-from mdfconv.conversion import DEFAULT_METHOD, Conversion, explain, list_methods
+from mdfconv.conversion import DEFAULT_METHOD, Conversion, explain, find_method, list_methods
 from mdfconv.conversion.endpoint import endpoint
 from mdfconv.distributions import list_distributions
 from mdfconv.distributions.base import AnisotropicDistribution
@@ -69,7 +69,7 @@ def command(
             metavar="METHOD",
             autocompletion=_methods,
             help="closed-form (keeps the lobe's shape, approximately), half-angle, ward, peak, "
-            "or fit: exact, under the metric.",
+            "fit: exact, under the metric, or fast: the same from stored polynomials.",
         ),
     ] = DEFAULT_METHOD,
     metric: Annotated[
@@ -77,8 +77,8 @@ def command(
         typer.Option(
             metavar="METRIC",
             autocompletion=_metrics,
-            help="What fit keeps, and what the errors measure: unit (the shape of the lobe), "
-            "energy (the light) or display (the picture on a screen).",
+            help="What fit and fast keep, and what the errors measure: unit (the shape of the "
+            "lobe), energy (the light) or display (the picture on a screen).",
         ),
     ] = "unit",
     exposure: Annotated[
@@ -123,10 +123,10 @@ def command(
     found, reasons = _convert(numbers, source, targets, rule, errors=form is not Format.plain)
     if reasons and (not every or not found):
         raise reasons[0]
-    if metric != "unit" and method != "fit":
+    if metric != "unit" and not find_method(method).follows_metric:
         typer.echo(
             f"mdfconv: note: the metric is that of the errors; {method} does not depend on it, "
-            "--method fit does",
+            "--method fit and --method fast do",
             err=True,
         )
     for reason in reasons:
@@ -162,12 +162,12 @@ class _Rule:
         )
 
     def others(self) -> list[_Rule]:
-        """Return the other methods, the fit under every metric."""
-        metrics = {"fit": list_metrics()}
+        """Return the other methods, the fit under every metric; fast is the fit again."""
         every = [
             replace(self, method=entry.name, metric=metric)
             for entry in list_methods()
-            for metric in metrics.get(entry.name, [self.metric])
+            if entry.name != "fast"
+            for metric in (list_metrics() if entry.follows_metric else [self.metric])
         ]
         return [rule for rule in every if rule != self]
 
@@ -294,7 +294,9 @@ def _cells(entry: Conversion) -> tuple[str, ...]:
     return (
         value_text(entry.value),
         value_text(entry.result),
-        f"fit {entry.metric}" if entry.method == "fit" else entry.method,
+        f"{entry.method} {entry.metric}"
+        if find_method(entry.method).follows_metric
+        else entry.method,
         f"{entry.rmse:.3g}",
         f"{entry.max_error:.3g}",
         keeps,

@@ -1,34 +1,24 @@
-"""Conversion of a parameter from one distribution to another.
-
-A new method is a module that defines ``METHOD``, and one line in `_MODULES`.
-"""
+"""Conversion of a parameter from one distribution to another."""
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any, TypeAlias
 
 import numpy as np
 
+from mdfconv.conversion.checks import check_covered, check_pair, unreachable
 from mdfconv.conversion.endpoint import Endpoint, endpoint, same_family
 from mdfconv.conversion.method import Method
-from mdfconv.conversion.residual import residual
-from mdfconv.distributions.base import AnisotropicDistribution
+from mdfconv.conversion.registry import DEFAULT_METHOD, find_method, list_methods
 from mdfconv.distributions.evaluation import Array, as_operand
 from mdfconv.distributions.parameter import number_text
-from mdfconv.errors import MdfconvError, check_name, unknown_name
+from mdfconv.errors import MdfconvError, MdfconvWarning
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.metrics import metric as find_metric
 
 __all__ = ["DEFAULT_METHOD", "Conversion", "convert", "explain", "find_method", "list_methods"]
-
-DEFAULT_METHOD = "closed-form"
-_MODULES = ("closed_form", "half_angle", "ward", "peak", "least_squares")
-_ALL: tuple[Method, ...] = tuple(
-    import_module(f"{__name__}.{module}").METHOD for module in _MODULES
-)
-_BY_NAME = {entry.name: entry for entry in _ALL}
 
 Value: TypeAlias = float | tuple[float, float]
 
@@ -70,25 +60,6 @@ class Conversion:
     notes: tuple[str, ...]
 
 
-def list_methods() -> tuple[Method, ...]:
-    """Return every conversion method, the default first."""
-    return _ALL
-
-
-def find_method(name: str) -> Method:
-    """Return the method with a given name.
-
-    Raises
-    ------
-    MdfconvError
-        If the name is not known; the message offers the nearest ones.
-    """
-    key = check_name("method", name).strip().lower().replace("_", "-")
-    if key not in _BY_NAME:
-        raise unknown_name("method", name, list(_BY_NAME))
-    return _BY_NAME[key]
-
-
 def convert(
     values: Any,
     source: str | Endpoint,
@@ -109,10 +80,11 @@ def convert(
         Distribution, with an encoding after a colon: ``"ggx:roughness"`` (α = r²),
         ``"ggx:glossiness"`` (α = (1−g)²).
     method : str
-        ``"closed-form"``, ``"half-angle"``, ``"ward"``, ``"peak"`` or ``"fit"``.
+        ``"closed-form"``, ``"half-angle"``, ``"ward"``, ``"peak"``, ``"fit"`` or ``"fast"``,
+        which is the fit within 1e-6 (display: 1e-4) at the price of a closed form.
     metric : str or Metric
-        What ``"fit"`` keeps: ``"unit"`` (the shape of the lobe), ``"energy"`` (the light) or
-        ``"display"`` (the picture on a screen).
+        What ``"fit"`` and ``"fast"`` keep: ``"unit"`` (the shape of the lobe), ``"energy"``
+        (the light) or ``"display"`` (the picture on a screen).
     exposure : float
         Exposure of the display metric; 1 puts the source's peak at white.
     gamma : float, optional
@@ -121,13 +93,19 @@ def convert(
     Returns
     -------
     float, numpy.ndarray or tuple
-        Parameters of the target, in the shape and the floating type of the values.
+        Parameters of the target, in the shape and the floating type of the values. With
+        ``"fast"`` elements of an array that are illegal or outside its range are NaN.
 
     Raises
     ------
     MdfconvError
         If a name is unknown, a value illegal, the pair not covered by the method, or a
         result outside the target's legal range. It is a ValueError.
+
+    Warns
+    -----
+    MdfconvWarning
+        Once, if elements of an array came back as NaN.
 
     Examples
     --------
@@ -139,17 +117,19 @@ def convert(
     sides = endpoint(source, gamma), endpoint(target, gamma)
     rule, measure = find_method(method), find_metric(metric, exposure)
     if isinstance(values, tuple):
-        _check_pair(values, *sides)
+        check_pair(values, *sides)
         return tuple(convert(axis, *sides, rule.name, metric=measure) for axis in values)
     operand = as_operand(values)
-    parameter = sides[0].decode(operand)
-    result = sides[1].encode(_apply(rule, measure, parameter, *sides))
+    if rule.gaps_as_nan and np.ndim(operand):
+        result = _apply_with_gaps(rule, measure, operand, *sides)
+    else:
+        result = sides[1].encode(_apply(rule, measure, sides[0].decode(operand), *sides))
     if isinstance(operand, float):
         return float(result)
     dtype = operand.dtype if operand.dtype.kind == "f" else np.dtype(np.float64)
     with np.errstate(over="ignore"):
         cast = result.astype(dtype)
-    if not np.isfinite(cast).all():
+    if np.isinf(cast).any():
         raise MdfconvError(f"a result is too large for {dtype.name}: convert in float64")
     return cast[()]
 
@@ -194,7 +174,7 @@ def explain(
     axes = [item if isinstance(item, tuple) else (item,) for item in items]
     for axis in axes:
         if len(axis) != 1:
-            _check_pair(axis, *sides)
+            check_pair(axis, *sides)
         if any(np.ndim(as_operand(value)) for value in axis):
             raise MdfconvError("explain takes numbers and pairs of numbers, not arrays in a list")
     parameter = sides[0].decode([value for axis in axes for value in axis])
@@ -202,7 +182,9 @@ def explain(
     stored = sides[1].encode(result).tolist()
     left = (np.full_like(result, np.nan),) * 2
     if errors:
-        left = residual(sides[0].distribution, parameter, sides[1].distribution, result, measure)
+        left = rule.residual(
+            parameter, sides[0].distribution, result, sides[1].distribution, measure
+        )
     route = _route(rule, *sides)
     found = []
     start = 0
@@ -264,7 +246,7 @@ def _apply(
     if same_family(source.distribution, target.distribution):
         result = parameter
     else:
-        _check_covered(rule, source, target)
+        check_covered(rule, measure, source, target)
         with np.errstate(all="ignore"):
             result = np.asarray(
                 rule.convert(parameter, source.distribution, target.distribution, measure)
@@ -272,69 +254,33 @@ def _apply(
     accepted = target.distribution.parameter.accepts(result) & ~np.isnan(target.encode(result))
     if not accepted.all():
         index = int(np.argmin(accepted))
-        raise _unreachable(rule, measure, parameter, result, index, source, target)
+        raise unreachable(rule, measure, parameter, result, index, source, target)
     return result
 
 
-def _check_covered(rule: Method, source: Endpoint, target: Endpoint) -> None:
-    pair = source.distribution, target.distribution
-    if rule.route(*pair) is None:
-        others = [entry.name for entry in _ALL if entry.route(*pair) is not None]
-        raise MdfconvError(
-            f"{rule.name} has no conversion from {_name(source)} to {_name(target)}; "
-            f"use {' or '.join(others)}"
-        )
-
-
-def _check_pair(axes: tuple[Any, ...], source: Endpoint, target: Endpoint) -> None:
-    if len(axes) != 2:
-        raise MdfconvError(f"a pair of parameters has two members, not {len(axes)}")
-    for side in (source, target):
-        if not isinstance(side.distribution, AnisotropicDistribution):
-            hint = "; use ashikhmin-shirley" if side.distribution.name == "blinn-phong" else ""
-            raise MdfconvError(
-                f"{side.distribution.name} is isotropic: it takes one parameter, not a pair{hint}"
-            )
-
-
-def _name(side: Endpoint) -> str:
-    gamma = getattr(side.distribution, "gamma", None)
-    return side.distribution.name + (f" (γ = {number_text(gamma)})" if gamma else "")
-
-
-def _unreachable(
-    rule: Method,
-    measure: Metric,
-    parameter: Array,
-    result: Array,
-    index: int,
-    source: Endpoint,
-    target: Endpoint,
-) -> MdfconvError:
-    """Return the error for a result that is illegal, naming the methods that answer."""
-    given, got = (float(array.flat[index]) for array in (parameter, result))
-    wanted = target.distribution.parameter
-    which = f" (value {index + 1} of {parameter.size})" if parameter.size > 1 else ""
-    start = f"{source.distribution.name} {source.distribution.parameter.symbol}"
-    legal = wanted.legal
-    outcome = f"gives {_name(target)} {wanted.symbol} = {number_text(got)}"
-    if np.isnan(got):
-        outcome = f"has no answer in {_name(target)}"
-    elif wanted.accepts(np.asarray(got)):
-        legal = target.stored.legal
-        outcome += f", which {target.label} cannot store"
-    answers = []
-    for other in _ALL:
-        if other is rule or other.route(source.distribution, target.distribution) is None:
-            continue
-        one = np.asarray([given])
-        with np.errstate(all="ignore"):
-            answer = target.encode(
-                other.convert(one, source.distribution, target.distribution, measure)
-            )
-        if target.stored.accepts(answer)[0]:
-            answers.append(f"{other.name} answers {number_text(float(answer[0]))}")
-    return MdfconvError(
-        f"for {start} = {number_text(given)}{which} {rule.name} {outcome}, outside {legal}; "
-        + (" and ".join(answers) or "no method answers")
+def _apply_with_gaps(
+    rule: Method, measure: Metric, operand: Array, source: Endpoint, target: Endpoint
+) -> Array:
+    """Convert an array; NaN, with one warning, where there is no answer."""
+    same = same_family(source.distribution, target.distribution)
+    if not same:
+        check_covered(rule, measure, source, target)
+    given = np.asarray(operand, dtype=np.float64)
+    with np.errstate(all="ignore"):
+        parameter = source.decode_legal(given)
+        result = parameter
+        if not same:
+            result = rule.convert(parameter, source.distribution, target.distribution, measure)
+    stored = target.encode(result)
+    answered = target.distribution.parameter.accepts(result) & ~np.isnan(stored)
+    if answered.all():
+        return stored
+    first = int(np.argmin(answered))
+    missing = answered.size - int(np.count_nonzero(answered))
+    warnings.warn(
+        f"{missing} of {given.size} values have no answer by {rule.name} from {source.label} to "
+        f"{target.label} and are NaN, the first is {number_text(float(given.flat[first]))}",
+        MdfconvWarning,
+        stacklevel=3,
     )
+    return np.where(answered, stored, np.nan)

@@ -52,6 +52,15 @@ class Endpoint:
         )
         return checked
 
+    def decode_legal(self, values: Array) -> Array:
+        """Return the parameters for stored values (float64); NaN for those that are illegal."""
+        legal = self.stored.accepts(values)
+        stored = values if legal.all() else np.where(legal, values, np.nan)
+        if not self.encoding:
+            return stored
+        parameter = self.encoding.decode(stored)
+        return np.where(self.distribution.parameter.accepts(parameter), parameter, np.nan)
+
     def encode(self, parameter: Array) -> Array:
         """Return the stored values for parameters; NaN where they cannot be stored."""
         if not self.encoding:

@@ -17,6 +17,7 @@ class LeastSquares(Method):
 
     name = "fit"
     source = "least squares, mdfconv.fitting"
+    follows_metric = True
 
     def keeps(self, metric: Metric) -> str:
         """Return what the metric keeps."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
+from mdfconv.conversion.residual import residual
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
@@ -15,6 +16,10 @@ class Method(ABC):
 
     name: ClassVar[str]
     source: ClassVar[str]
+    # Whether the answer depends on the metric; else that is only what the errors measure.
+    follows_metric: ClassVar[bool] = False
+    # Whether elements of an array that have no answer become NaN, with a warning.
+    gaps_as_nan: ClassVar[bool] = False
 
     @abstractmethod
     def keeps(self, metric: Metric) -> str:
@@ -33,6 +38,25 @@ class Method(ABC):
         Where the rule leaves the target's legal range it returns what it computes; where it
         computes nothing, NaN.
         """
+
+    def covers_metric(self, metric: Metric) -> bool:
+        """Return whether the method can answer under a metric."""
+        return True
+
+    def residual(
+        self,
+        parameter: Array,
+        source: Distribution,
+        result: Array,
+        target: Distribution,
+        metric: Metric,
+    ) -> tuple[Array, Array]:
+        """Return the RMSE and the maximum error of conversions, shapes (n,).
+
+        Both are those of `mdfconv.conversion.residual.residual`, which a method may know
+        without computing them.
+        """
+        return residual(source, parameter, target, result, metric)
 
     def is_exact(self, source: Distribution, target: Distribution) -> bool:
         """Return whether the target takes the very same form."""

@@ -18,6 +18,8 @@ from mdfconv.reports.comparison import compare as compare_pictures
 from mdfconv.reports.comparison_figure import draw_comparison
 from mdfconv.reports.error_curves import PAPER_SETS, curves
 from mdfconv.reports.error_figure import draw_errors
+from mdfconv.reports.method_page import method_page
+from mdfconv.reports.stability_page import stability_page
 from mdfconv.reports.table2 import COLUMNS, compare, fit_table, paper_sweep
 from mdfconv.reports.text import csv_text, file_bytes, markdown_text, write_files
 
@@ -228,12 +230,30 @@ def pictures() -> Artefact:
     )
 
 
+def methods() -> Artefact:
+    """Return the methods beside the best fit: the figures for the choice of a default."""
+    files, summary = method_page()
+    question = "which method should be the default"
+    return Artefact(files, question, summary, "mdfconv report")
+
+
+def stability() -> Artefact:
+    """Return the audit of hard cases."""
+    files, summary = stability_page()
+    question = "how accurate the forms are where formulas lose their digits"
+    return Artefact(files, question, summary, "mdfconv stability")
+
+
+# Times cannot be reproduced: these are made by `mdfconv bench`, and only listed here.
+MEASURED = ("speed-error.md", "speed-error.csv", "speed-error.png")
 _ARTEFACTS: tuple[Callable[[], Artefact], ...] = (
     table2,
     other_metrics,
     closed_forms,
     error_figures,
     pictures,
+    methods,
+    stability,
 )
 COUNT = len(_ARTEFACTS)
 
@@ -261,10 +281,12 @@ def build(folder: Path) -> Iterator[Artefact]:
         write_files({folder / name: content for name, content in artefact.files.items()})
         done.append(artefact)
         yield artefact
-    write_files({folder / "README.md": file_bytes(_index(done))})
+    measured = [name for name in MEASURED if (folder / name).exists()]
+    write_files({folder / "README.md": file_bytes(_index(done, measured))})
 
 
-def _index(artefacts: list[Artefact]) -> str:
+def _index(artefacts: list[Artefact], measured: list[str]) -> str:
+    """Return the index; `measured` are files in the folder that another command made."""
     rows = [
         {
             "files": ", ".join(f"[{name}]({name})" for name in artefact.files),
@@ -274,6 +296,15 @@ def _index(artefacts: list[Artefact]) -> str:
         }
         for artefact in artefacts
     ]
+    if measured:
+        rows.append(
+            {
+                "files": ", ".join(f"[{name}]({name})" for name in measured),
+                "reproduces": "speed against error: what the choices cost",
+                "agreement": "measured on one machine; other machines give other times",
+                "command": "`mdfconv bench`",
+            }
+        )
     return "\n".join(
         [
             "# Report",

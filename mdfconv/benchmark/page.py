@@ -1,0 +1,162 @@
+"""The measurements for people: tables in few digits, and a page of them with what they mean."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mdfconv.benchmark import verdicts
+from mdfconv.benchmark.measure import Measurements
+from mdfconv.benchmark.timing import Spread
+from mdfconv.reports.text import Record, markdown_text
+
+TITLES = {
+    "substitutes": "Distributions as substitutes",
+    "methods": "Conversion methods",
+    "kernels": "Kernels",
+}
+_LEGENDS = {
+    "substitutes": "ns: time to evaluate the unit form at one angle, from β. operations: "
+    "arithmetic from cos β with the constants precomputed, a transcendental function counting "
+    "10. RMSE and max error: of the best fit to the unit form, relative to its peak, on β from 0 "
+    "to 4.8 β_half. energy error: of the best fit to the normalized form, "
+    "√(∫ (D − D_ref)² cos β dω / ∫ D_ref² cos β dω).",
+    "methods": "Over lobes as wide as Beckmann's in the paper's sweep, m_B from 0.0045 to 0.45. "
+    "parameter error: |p/p_fit − 1|, median and maximum, against the best fit under the metric. "
+    "RMSE: what the conversion leaves, under the metric and relative to the source's peak. "
+    "curve_fit: "
+    "scipy.optimize.curve_fit called once a value, on the samples and weights that fit uses, "
+    "from equal half angles.",
+    "kernels": "ns: time to evaluate the unit form at one angle. textbook: the printed "
+    "expression in NumPy. functions: the transcendental functions that the form cannot avoid, "
+    "or a tangent and a copy, timed alone on whole arrays. copy: copying the array of β. ×: the "
+    "kernel's time over that of the textbook, of those functions, of the copy; medians over "
+    "rounds. memory: peak of newly allocated memory over the size of the result. The angles "
+    "rise: beyond the end of Schlick's lobe whole blocks are skipped; in random order it takes "
+    "two to three times as long.",
+}
+_CHOOSING = """\
+## Choosing
+
+- A distribution costs a nanosecond or a few; what it gets wrong stays in every picture. Choose \
+by the error first, and by the time only among those whose error the scene can bear: \
+`mdfconv recommend` does that for one surface.
+- The count of operations is not the time: a vector unit evaluates the exponential of several \
+numbers at once, and a rational form has steps of its own. Compare the columns.
+- For a scene's few thousand materials every method is quick. The closed forms pay for arrays of \
+millions, such as textures; where the result has to be right, and for energy and display, which \
+they do not know, use `fast` or `fit`.
+- Times depend on the processor and on NumPy; run `mdfconv bench` where the code will run."""
+
+
+def tables(found: Measurements) -> dict[str, list[dict[str, Any]]]:
+    """Return the three tables with rounded cells, a median with its quartiles in one."""
+    return {
+        "substitutes": [
+            {
+                "reference": f"{row.reference} {row.reference_parameter:g}",
+                "distribution": row.distribution,
+                "parameter": _rounded(row.parameter, 5),
+                "operations": row.operations,
+                "float32 ns": _times(row.ns["float32"]),
+                "float64 ns": _times(row.ns["float64"]),
+                "RMSE": _rounded(row.rmse),
+                "max error": _rounded(row.max_error),
+                "energy error": _rounded(row.energy_error),
+            }
+            for row in found.substitutes
+        ],
+        "methods": [
+            {
+                "method": row.method,
+                "metric": row.metric,
+                "values": row.values,
+                "values per second": _counts(row.per_second),
+                "parameter error": _rounded(row.parameter_error),
+                "largest": _rounded(row.parameter_error_max),
+                "RMSE": _rounded(row.rmse),
+                "largest RMSE": _rounded(row.rmse_max),
+                "answered": f"{100 * row.answered:.3g} %",
+            }
+            for row in found.methods
+        ],
+        "kernels": [
+            {
+                "distribution": row.distribution,
+                "type": row.precision,
+                "kernel ns": _times(row.kernel),
+                "textbook ns": _times(row.textbook),
+                "functions": row.functions,
+                "their ns": _rounded(row.floor.median),
+                "copy ns": _rounded(row.copy.median),
+                "× textbook": _rounded(1 / row.speedup),
+                "× functions": _rounded(row.over_floor),
+                "× copy": _rounded(row.over_copy),
+                "memory": _rounded(row.memory),
+            }
+            for row in found.kernels
+        ],
+    }
+
+
+def title(found: Measurements, name: str) -> str:
+    """Return the heading of a table."""
+    pair = f", {found.methods[0].source} → {found.methods[0].target}" if name == "methods" else ""
+    return TITLES[name] + pair
+
+
+def sentences(found: Measurements) -> dict[str, list[str]]:
+    """Return what each table says."""
+    return {
+        "substitutes": verdicts.on_substitutes(found),
+        "methods": verdicts.on_methods(found),
+        "kernels": verdicts.on_kernels(found),
+    }
+
+
+def markdown_page(found: Measurements, picture: str | None = None) -> str:
+    """Return the measurements as a Markdown page.
+
+    Parameters
+    ----------
+    found : Measurements
+        What was measured.
+    picture : str, optional
+        The name of the picture's file, which the page then shows.
+    """
+    lines = ["# Speed against error", "", *_machine(found), ""]
+    if picture:
+        lines += [f"![Error against time, distributions and methods]({picture})", ""]
+    said = sentences(found)
+    for name, rows in tables(found).items():
+        lines += [f"## {title(found, name)}", "", _LEGENDS[name], ""]
+        lines += [_table(rows), "", *(f"- {sentence}" for sentence in said[name]), ""]
+    return "\n".join([*lines, _CHOOSING])
+
+
+def _machine(found: Measurements) -> list[str]:
+    what, sizes = found.machine, found.sizes
+    return [
+        f"Measured on {what['cpu']} ({what['cpus']} CPUs, {what['vector_extensions']}), "
+        f"{what['system']}, Python {what['python']}, NumPy {what['numpy']}, SciPy {what['scipy']}. "
+        f"Medians of {sizes.rounds} interleaved rounds after a warm-up, quartiles in parentheses; "
+        f"evaluations on {sizes.angles:,} angles from 0 to π/2; processor time of one thread. "
+        "Made by `mdfconv bench --format markdown`."
+    ]
+
+
+def _table(rows: list[dict[str, Any]]) -> str:
+    table: list[Record] = list(rows)
+    return markdown_text(list(rows[0]), table)
+
+
+def _rounded(value: float, digits: int = 3) -> float:
+    return float(f"{value:.{digits}g}")
+
+
+def _times(times: Spread) -> str:
+    return f"{times.median:#.3g} ({times.low:#.3g}–{times.high:#.3g})"
+
+
+def _counts(counts: Spread) -> str:
+    median, low, high = (f"{_rounded(value):,.0f}" for value in counts)
+    return f"{median} ({low}–{high})"

@@ -1,0 +1,237 @@
+"""Model only what the scene needs: the cheapest distribution and conversion within a tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mdfconv.benchmark.methods import answers, covering
+from mdfconv.benchmark.substitutes import best, evaluation_times
+from mdfconv.benchmark.timing import NOISE, interleave, spread
+from mdfconv.conversion.endpoint import same_family
+from mdfconv.conversion.method import Method
+from mdfconv.conversion.residual import residual
+from mdfconv.distributions import Distribution
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric
+
+# Half a second for eight distributions.
+_ANGLES, _ROUNDS = 4_000_000, 5
+# A surface is converted once: costs of a conversion that differ by less are the same.
+_SAME_COST = 10.0
+NOT_CONVERTED = "none"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One distribution in the source's place.
+
+    Parameters
+    ----------
+    distribution : str
+        Its name.
+    parameter : float
+        Its parameter.
+    method : str
+        The method that gives the parameter; "none" for the source itself.
+    ns : float
+        Nanoseconds to evaluate the unit form at one angle in float32: the median.
+    operations : int
+        `Distribution.operations`.
+    rmse, max_error : float
+        Root mean square and maximum of the error under the metric, relative to the source's
+        peak, on β from 0 to 4.8 β_half of the source.
+    """
+
+    distribution: str
+    parameter: float
+    method: str
+    ns: float
+    operations: int
+    rmse: float
+    max_error: float
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """What to model a surface with.
+
+    Parameters
+    ----------
+    chosen : Candidate
+        The cheapest distribution within the tolerance, by the cheapest method within it.
+    others : tuple of Candidate
+        The other distributions by their best fits, those within the tolerance first.
+    tolerance : float
+        The largest error that is allowed.
+    reason : str
+        Why, in a sentence.
+    """
+
+    chosen: Candidate
+    others: tuple[Candidate, ...]
+    tolerance: float
+    reason: str
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return the candidates as rows of a table, the chosen one first."""
+        return [
+            vars(entry)
+            | {"within": entry.max_error <= self.tolerance, "chosen": entry is self.chosen}
+            for entry in (self.chosen, *self.others)
+        ]
+
+
+def recommend(
+    source: Distribution,
+    parameter: float,
+    distributions: Sequence[Distribution],
+    metric: Metric,
+    tolerance: float,
+) -> Recommendation:
+    """Find the cheapest distribution and conversion whose error stays within a tolerance.
+
+    The cost of a distribution is its time measured now, in float32: of those as quick as the
+    quickest but for noise, the one with the fewest operations, then the one with the smallest
+    error. The cost of a conversion is the time that it takes for one value: of the methods
+    within a tenfold of the quickest, the one with the smallest error.
+
+    Parameters
+    ----------
+    source : Distribution
+        What the surface is given in; it is a candidate without an error, so there is always an
+        answer.
+    parameter : float
+        Its parameter.
+    distributions : sequence of Distribution
+        The candidates.
+    metric : Metric
+        Under which errors are taken.
+    tolerance : float
+        The largest error allowed, a share of the source's peak.
+
+    Raises
+    ------
+    MdfconvError
+        If the tolerance is not a positive number.
+    """
+    if not 0 < tolerance < np.inf:
+        raise MdfconvError(f"a tolerance is a number above 0, not {tolerance:g}")
+    given = np.array([parameter])
+    candidates = _measure(source, given, distributions, metric)
+    found = choose(candidates, tolerance)
+    chosen = found
+    if found.method != NOT_CONVERTED:
+        target = next(entry for entry in distributions if entry.name == found.distribution)
+        chosen = _convert(source, given, target, metric, found, tolerance)
+    others = sorted(
+        (entry for entry in candidates if entry is not found),
+        key=lambda entry: (entry.max_error > tolerance, entry.ns),
+    )
+    return Recommendation(
+        chosen, tuple(others), tolerance, _reason(chosen, candidates, source.name, tolerance)
+    )
+
+
+def choose(candidates: Sequence[Candidate], tolerance: float) -> Candidate:
+    """Return the cheapest of the candidates within a tolerance.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        At least one of them is within the tolerance.
+    tolerance : float
+        The largest `max_error` allowed.
+    """
+    return min(_quickest(candidates, tolerance), key=lambda one: (one.operations, one.max_error))
+
+
+def _quickest(candidates: Sequence[Candidate], tolerance: float) -> list[Candidate]:
+    """Return those within the tolerance that are as quick as the quickest but for noise."""
+    within = [entry for entry in candidates if entry.max_error <= tolerance]
+    least = min(entry.ns for entry in within)
+    return [entry for entry in within if entry.ns <= (1 + NOISE) * least]
+
+
+def _measure(
+    source: Distribution, given: Array, distributions: Sequence[Distribution], metric: Metric
+) -> list[Candidate]:
+    """Return every distribution that has a best fit, timed."""
+    fits = [(entry, *best(source, given, entry, metric)) for entry in distributions]
+    there = [fit for fit in fits if not np.isnan(fit[1][0])]
+    pairs = [(entry, float(parameter[0])) for entry, parameter, *_ in there]
+    times = evaluation_times(pairs, "float32", _ANGLES, _ROUNDS)
+    return [
+        Candidate(
+            entry.name,
+            float(parameter[0]),
+            NOT_CONVERTED if same_family(source, entry) else "fit",
+            time.median,
+            entry.operations,
+            float(rmse[0]),
+            float(max_error[0]),
+        )
+        for (entry, parameter, rmse, max_error), time in zip(there, times, strict=True)
+    ]
+
+
+def _convert(
+    source: Distribution,
+    given: Array,
+    target: Distribution,
+    metric: Metric,
+    candidate: Candidate,
+    tolerance: float,
+) -> Candidate:
+    """Return a candidate by the cheapest method that keeps it within the tolerance."""
+    found: dict[str, Candidate] = {}
+    runs: dict[str, Callable[[], object]] = {}
+    for method in covering(source, target, metric):
+        result = answers(method, given, source, target, metric)
+        if np.isnan(result[0]):
+            continue
+        rmse, max_error = (float(e[0]) for e in residual(source, given, target, result, metric))
+        if max_error <= tolerance:
+            found[method.name] = replace(
+                candidate,
+                parameter=float(result[0]),
+                method=method.name,
+                rmse=rmse,
+                max_error=max_error,
+            )
+            runs[method.name] = _conversion(method, given, source, target, metric)
+    times = {name: spread(t).median for name, t in interleave(runs, 3, lambda steps: None).items()}
+    quick = [name for name, time in times.items() if time <= _SAME_COST * min(times.values())]
+    return found[min(quick, key=lambda name: found[name].max_error)]
+
+
+def _conversion(
+    method: Method, given: Array, source: Distribution, target: Distribution, metric: Metric
+) -> Callable[[], object]:
+    return lambda: answers(method, given, source, target, metric)
+
+
+def _reason(
+    chosen: Candidate, candidates: Sequence[Candidate], source: str, tolerance: float
+) -> str:
+    own = next(entry for entry in candidates if entry.method == NOT_CONVERTED)
+    count = sum(entry.max_error <= tolerance for entry in candidates)
+    rivals = [
+        entry.distribution
+        for entry in _quickest(candidates, tolerance)
+        if entry.distribution != chosen.distribution
+    ]
+    tie = f", as quick as {' and '.join(rivals)} with no more operations" if rivals else ""
+    if count == 1:
+        return f"keep {source}: nothing else stays within {tolerance:g} of its peak."
+    if chosen.method == NOT_CONVERTED:
+        return f"keep {source}: of {count} within {tolerance:g} it is the cheapest{tie}."
+    return (
+        f"{chosen.distribution} stays within {tolerance:g} of the peak of {source} "
+        f"({chosen.max_error:.2g}) at {chosen.ns / own.ns:.2g} of its time, the cheapest of "
+        f"{count} that do{tie}; {chosen.method} is the cheapest conversion that keeps it there."
+    )

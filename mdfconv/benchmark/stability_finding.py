@@ -1,0 +1,152 @@
+"""How the audit of hard cases judges a group of values."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from importlib.resources import files
+
+import numpy as np
+
+from mdfconv.distributions.evaluation import Array
+
+DTYPES = (np.float64, np.float32, np.float16)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The worst of a group of hard cases, ours beside the printed expression.
+
+    Parameters
+    ----------
+    distribution : str
+        The distribution; of a conversion the source.
+    rule : str
+        ``"unit"`` or ``"normalized"`` for a kernel, else the method, ``"... and back"`` for a
+        round trip.
+    regime : str
+        What makes the cases hard.
+    dtype : str
+        Type of the input and of the result.
+    cases : int
+        The number of cases.
+    out_of_range : int
+        How many of them have an exact value that the type holds only as 0, a subnormal number
+        or infinity. They are right if the result is that; no error can be stated.
+    error : float
+        The largest relative error against the exact value; inf or NaN for a failure.
+    error_in_eps : float
+        The same in units of the type's rounding, ``numpy.finfo(dtype).eps``; a correctly
+        rounded result has at most ½.
+    textbook : float or str
+        The largest relative error of the printed expression in plain NumPy, in the same type;
+        ``"NaN"`` or ``"inf"`` where it comes to that, and empty where nothing is printed.
+    worst : str
+        Where `error` is largest.
+    """
+
+    distribution: str
+    rule: str
+    regime: str
+    dtype: str
+    cases: int
+    out_of_range: int
+    error: float
+    error_in_eps: float
+    textbook: float | str
+    worst: str
+
+
+class Tally:
+    """Collects the errors of one group and makes the finding of them.
+
+    Parameters
+    ----------
+    distribution, rule, regime : str
+        As for `Finding`.
+    dtype : numpy.dtype
+        Type of the values.
+    """
+
+    def __init__(self, distribution: str, rule: str, regime: str, dtype: np.dtype) -> None:
+        self._group = distribution, rule, regime
+        self._dtype = dtype
+        self._ours: list[float] = []
+        self._textbook: list[float] = []
+        self._places: list[str] = []
+        self._out_of_range = 0
+
+    def add(
+        self,
+        values: Array,
+        textbook: Array | None,
+        exact: Sequence[Decimal],
+        places: Sequence[str],
+    ) -> None:
+        """Compare values of the group's type, and the printed expression's, with exact ones."""
+        self._ours += relative_errors(values, exact)
+        if textbook is not None:
+            self._textbook += relative_errors(textbook, exact)
+        self._places += places
+        self._out_of_range += sum(not _in_range(value, self._dtype) for value in exact)
+
+    def finding(self) -> Finding:
+        """Return the worst."""
+        place = int(np.argmax(np.nan_to_num(self._ours, nan=np.inf)))
+        error = self._ours[place]
+        return Finding(
+            *self._group,
+            dtype=self._dtype.name,
+            cases=len(self._ours),
+            out_of_range=self._out_of_range,
+            error=two_digits(error),
+            error_in_eps=two_digits(error / float(np.finfo(self._dtype).eps)),
+            textbook=_worst_of_textbook(self._textbook),
+            worst=self._places[place],
+        )
+
+
+def relative_errors(values: Array, exact: Sequence[Decimal]) -> list[float]:
+    """Return |value − exact|/|exact| of each value, rounded only at the end.
+
+    Where the exact value is below the smallest normal number or above the largest number of
+    the type, the error is 0 if the value is so too and inf otherwise; NaN stays NaN.
+    """
+    return [_error(float(v), e, values.dtype) for v, e in zip(values, exact, strict=True)]
+
+
+def _error(value: float, exact: Decimal, dtype: np.dtype) -> float:
+    if np.isnan(value):
+        return np.nan
+    if not _in_range(exact, dtype):
+        limits = np.finfo(dtype)
+        small = float(limits.smallest_normal)
+        # The last rounding may lift a value just across the limit.
+        fits = 0 <= value <= small * 1.01 if exact < small else value >= 0.99 * float(limits.max)
+        return 0.0 if fits else np.inf
+    return np.inf if np.isinf(value) else float(abs(Decimal(value) - exact) / exact)
+
+
+def _in_range(exact: Decimal, dtype: np.dtype) -> bool:
+    limits = np.finfo(dtype)
+    return float(limits.smallest_normal) <= exact <= float(limits.max)
+
+
+def _worst_of_textbook(errors: list[float]) -> float | str:
+    if not errors:
+        return ""
+    worst = float(np.max(errors))
+    return two_digits(worst) if np.isfinite(worst) else str(worst).replace("nan", "NaN")
+
+
+def two_digits(value: float) -> float:
+    """Return a value rounded to two significant digits: an error's size is what matters."""
+    return float(f"{value:.1e}")
+
+
+def read_rows(name: str) -> list[dict[str, str]]:
+    """Return the rows of a file of reference values."""
+    text = files("mdfconv.benchmark").joinpath("data", name).read_text(encoding="utf-8")
+    return list(csv.DictReader(text.splitlines()))

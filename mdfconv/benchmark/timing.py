@@ -1,0 +1,107 @@
+"""Times that can be compared on a machine that does other things as well.
+
+What is to be compared runs in turns, in an order shuffled anew each round, so that a machine
+that slows down for a while slows down all of it. The first round warms up and is not counted.
+Processor time of the thread is counted, which does not run while others have the processor.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from mdfconv.distributions.evaluation import Array
+
+Advance = Callable[[int], None]
+
+# Medians that differ by a smaller share are the same on a machine that is not idle.
+NOISE = 0.1
+# On Windows processor time advances in steps of 16 ms.
+clock = time.perf_counter if os.name == "nt" else time.thread_time
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is measured.
+
+    Parameters
+    ----------
+    angles : int
+        Angles of an evaluation, uniform on [0, π/2].
+    conversions : int
+        Values of a conversion by a method for which that many take about a second at most.
+    fits : int
+        Values of a conversion by any other method, and of the comparison of results.
+    loop : int
+        Values of a loop of scipy.optimize.curve_fit.
+    rounds : int
+        Repeats that are counted.
+    """
+
+    angles: int
+    conversions: int
+    fits: int
+    loop: int
+    rounds: int
+
+
+FULL = Sizes(angles=4_000_000, conversions=1_000_000, fits=256, loop=17, rounds=11)
+QUICK = Sizes(angles=2_000_000, conversions=100_000, fits=32, loop=5, rounds=5)
+
+
+class Spread(NamedTuple):
+    """A median with the quartiles around it."""
+
+    median: float
+    low: float
+    high: float
+
+    def columns(self, name: str) -> dict[str, float]:
+        """Return the three as columns of a table."""
+        return {name: self.median, f"{name}_low": self.low, f"{name}_high": self.high}
+
+
+def spread(samples: Array) -> Spread:
+    """Return the median and the quartiles of samples."""
+    low, median, high = np.percentile(samples, [25, 50, 75])
+    return Spread(float(median), float(low), float(high))
+
+
+def interleave(
+    functions: Mapping[str, Callable[[], object]], rounds: int, advance: Advance
+) -> dict[str, Array]:
+    """Time functions in turns.
+
+    Parameters
+    ----------
+    functions : dict
+        From names to what is called without arguments.
+    rounds : int
+        Repeats that are counted, after one that is not.
+    advance : callable
+        Called with 1 after each round, the first one included.
+
+    Returns
+    -------
+    dict
+        From names to seconds, shape (rounds,); the same place in two of them is the same round.
+    """
+    times: dict[str, list[float]] = {name: [] for name in functions}
+    order = list(functions)
+    shuffle = random.Random(0).shuffle
+    for count in range(rounds + 1):
+        shuffle(order)
+        for name in order:
+            start = clock()
+            functions[name]()
+            elapsed = clock() - start
+            if count:
+                times[name].append(elapsed)
+        advance(1)
+    return {name: np.array(samples) for name, samples in times.items()}

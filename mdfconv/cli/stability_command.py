@@ -1,0 +1,53 @@
+"""``mdfconv stability``."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from mdfconv.cli.output import FileOption, FormOption, write_records
+
+
+class Part(StrEnum):
+    """The parts of the audit."""
+
+    kernels = "kernels"
+    conversions = "conversions"
+
+
+def command(
+    format_: FormOption = None,
+    output: FileOption = None,
+    mdf: Annotated[
+        list[str] | None,
+        typer.Option("--mdf", metavar="MDF", help="Only this distribution; repeatable."),
+    ] = None,
+    part: Annotated[Part | None, typer.Option(help="Only this part.")] = None,
+) -> None:
+    """Audit the hard cases: errors against 50-digit values, beside those of the printed formulas.
+
+    For every distribution the unit form, the normalized form and the conversions from it, where
+    formulas lose their digits: mirror-smooth surfaces, grazing angles, edges, limits. `error` is
+    the worst relative error, `error_in_eps` the same in units of the type's rounding, `textbook`
+    that of the printed expression in plain NumPy. `out_of_range` counts exact values that the
+    type holds as 0, a subnormal number or infinity only; any other result there is an error of
+    inf.
+
+    Examples:
+
+    mdfconv stability
+
+    mdfconv stability --mdf ggx --part kernels
+
+    mdfconv stability --part conversions --format markdown
+    """
+    from dataclasses import asdict, fields
+
+    from mdfconv.benchmark.stability import audit
+    from mdfconv.benchmark.stability_finding import Finding
+
+    rows = [asdict(finding) for finding in audit(mdf or (), part)]
+    columns = [field.name for field in fields(Finding)]
+    write_records(columns, rows, format_, output, "Hard cases: worst relative errors")

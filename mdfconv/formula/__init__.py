@@ -1,0 +1,9 @@
+"""Short formulas for shaders and importers, found by search over a family.
+
+`cheapest` finds one for a pair, a range and a tolerance, `write_formula` gives the code.
+"""
+
+from mdfconv.formula.languages import LANGUAGES, write_formula
+from mdfconv.formula.search import Problem, cheapest, pareto_front, usual_range
+
+__all__ = ["LANGUAGES", "Problem", "cheapest", "pareto_front", "usual_range", "write_formula"]

@@ -1,0 +1,143 @@
+"""The family of formulas: powers of a polynomial or rational function in a natural variable.
+
+    t = (wᶠ P(wᵏ) / Q(wᵏ))ᵉ
+
+w is what the source stores, or 1 − it for a glossiness, and t the same of the target. Lobes are
+similar to each other, so that a good exponent e and a good factor wᶠ leave P and Q little to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mdfconv.distributions.evaluation import Array
+
+# The price of ÷, √ and 1/√ against that of +, − and ×, as on graphics processors.
+SLOW = 4
+# Prices of raising to these powers.
+POWERS = {
+    -2.0: SLOW + 1,
+    -1.0: SLOW,
+    -0.5: SLOW,
+    0.0: 0,
+    0.5: SLOW,
+    1.0: 0,
+    2.0: 1,
+    4.0: 2,
+}
+_VARIABLES = (1.0, 2.0, 4.0, 0.5, -1.0)
+_FACTORS = (0.0, 1.0, 2.0, -1.0, -2.0, 0.5)
+# A fourth root is the root of a root.
+_OUTER = {1.0: 0, 2.0: 1, 0.5: SLOW, -0.5: SLOW, -1.0: SLOW, 0.25: 2 * SLOW, -0.25: 2 * SLOW}
+_MOST_TERMS = 8
+_MOST_RATIONAL_TERMS = 4
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The form of a formula, without its coefficients.
+
+    Parameters
+    ----------
+    variable, factor, outer : float
+        The exponents k, f and e.
+    numerator, denominator : int
+        The numbers of coefficients of P and of Q; Q = 1 has none, any other starts with 1.
+    """
+
+    variable: float
+    factor: float
+    outer: float
+    numerator: int
+    denominator: int = 0
+
+    @property
+    def operations(self) -> int:
+        """The price: + − × count 1 each, ÷ √ 1/√ count 4 each."""
+        has_terms = self.numerator > 1 or self.denominator > 0
+        steps = self.numerator - 1 + self.denominator
+        price = 2 * steps + _OUTER[self.outer]
+        price += SLOW if self.denominator else 0
+        price += POWERS[self.variable] if has_terms else 0
+        if self.factor:
+            shared = has_terms and self.factor == self.variable
+            price += 1 + (0 if shared else POWERS[self.factor])
+        return price
+
+
+def shapes() -> Iterator[Shape]:
+    """Yield every shape of the family, the cheapest first."""
+    found = {
+        Shape(variable, factor, outer, numerator, denominator)
+        for variable in _VARIABLES
+        for factor in _FACTORS
+        for outer in _OUTER
+        for numerator, denominator in _sizes()
+        # A constant has no variable; 1 stands for all of them.
+        if numerator + denominator > 1 or variable == 1.0
+    }
+    key = lambda s: (s.operations, s.denominator, s.outer, s.factor, s.variable)  # noqa: E731
+    return iter(sorted(found, key=key))
+
+
+def _sizes() -> list[tuple[int, int]]:
+    polynomials = [(terms, 0) for terms in range(1, _MOST_TERMS + 1)]
+    few = range(1, _MOST_RATIONAL_TERMS + 1)
+    return polynomials + [(up, down) for up in few for down in few if abs(up - 1 - down) <= 1]
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A formula of the family, in single precision.
+
+    Parameters
+    ----------
+    shape : Shape
+        Its form.
+    numerator, denominator : tuple of float
+        Coefficients of P and Q, constant first; those of Q start after its 1.
+    error : float
+        The worst relative error over the range, evaluated in float32.
+    """
+
+    shape: Shape
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+    error: float = float("nan")
+
+
+def power(base: Array, exponent: float) -> Array:
+    """Return base to one of the family's powers, in its type and by the steps of the code."""
+    if exponent == 0:
+        return np.ones_like(base)
+    if exponent < 0:
+        return 1 / power(base, -exponent)
+    if exponent < 1:
+        return power(np.sqrt(base), 2 * exponent)
+    for _ in range(round(np.log2(exponent))):
+        base = base * base
+    return base
+
+
+def horner(coefficients: tuple[float, ...], u: Array) -> Array:
+    """Evaluate a polynomial in the type of its argument."""
+    value = np.full_like(u, coefficients[-1])
+    for coefficient in coefficients[-2::-1]:
+        value = value * u + u.dtype.type(coefficient)
+    return value
+
+
+def evaluate(formula: Formula, w: Array) -> Array:
+    """Return t for w, in the type of w and by the steps of the code that is emitted."""
+    shape = formula.shape
+    with np.errstate(all="ignore"):
+        u = power(w, shape.variable)
+        value = horner(formula.numerator, u)
+        if shape.factor:
+            value = power(w, shape.factor) * value
+        if formula.denominator:
+            value = value / horner((1.0, *formula.denominator), u)
+        return power(value, shape.outer)

@@ -1,0 +1,213 @@
+"""``mdfconv bench``: what is measured, and the command as a process."""
+
+import csv
+import io
+import json
+import os
+import stat
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.optimize import minimize_scalar
+
+import mdfconv
+from mdfconv.benchmark.labels import place_labels
+from mdfconv.benchmark.loop import curve_fit_loop
+from mdfconv.benchmark.methods import answers, method_speeds, sweep
+from mdfconv.benchmark.pareto import front
+from mdfconv.benchmark.substitutes import substitutes
+from mdfconv.benchmark.timing import Sizes, interleave, spread
+from mdfconv.cli.names import one_parameter_distributions
+from mdfconv.conversion import find_method
+from mdfconv.fitting.metrics import list_metrics, metric
+from mdfconv.reports.figures import pyplot
+from tests.cli.runner import run, run_on_terminal
+
+TINY = Sizes(angles=512, conversions=64, fits=4, loop=2, rounds=2)
+NAMES = [entry.name for entry in one_parameter_distributions()]
+
+
+def ignore(steps):
+    pass
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    """One run of the command, with all its files."""
+    folder = tmp_path_factory.mktemp("bench")
+    files = {ending: folder / f"out.{ending}" for ending in ("csv", "json", "png")}
+    options = [word for ending, path in files.items() for word in (f"--{ending}", path)]
+    status, out, err = run("bench", "--quick", "--format", "markdown", *options)
+    assert status == 0, err
+    return files, out, err
+
+
+def test_tables_are_the_same_in_csv_and_json(quick):
+    files, _, err = quick
+    assert [line.split()[:2] for line in err.splitlines()] == [["mdfconv:", "wrote"]] * 3
+    found = json.loads(files["json"].read_text())
+    rows = list(csv.DictReader(io.StringIO(files["csv"].read_text())))
+    for name in ("substitutes", "methods", "kernels"):
+        own = [row for row in rows if row["table"] == name]
+        assert len(own) == len(found[name])
+        for row, record in zip(own, found[name], strict=True):
+            for column, value in record.items():
+                assert row[column] == ("nan" if value is None else str(value))
+    assert found["machine"]["numpy"] == np.__version__
+    assert found["machine"]["cpu"]
+    assert all(found["verdicts"].values())
+
+
+def test_quick_run_holds_every_row_and_times_with_their_spread(quick):
+    found = json.loads(quick[0]["json"].read_text())
+    assert [row["distribution"] for row in found["substitutes"]] == 2 * NAMES
+    assert [row["distribution"] for row in found["kernels"]] == 2 * NAMES
+    covering = {"closed-form", "half-angle", "peak", "fit", "curve_fit"}
+    assert covering <= {row["method"] for row in found["methods"]}
+    for table, times in (
+        ("substitutes", ("ns_float64", "ns_float32")),
+        ("methods", ("per_second",)),
+        ("kernels", ("kernel_ns", "textbook_ns", "floor_ns", "copy_ns")),
+    ):
+        for row in found[table]:
+            for name in times:
+                assert 0 < row[f"{name}_low"] <= row[name] <= row[f"{name}_high"]
+    for row in found["kernels"]:
+        assert 1 <= row["memory"] < 1.2
+
+
+def test_page_is_complete(quick):
+    out = quick[1]
+    assert out.startswith("# Speed against error\n")
+    assert "![Error against time, distributions and methods](out.png)" in out
+    for heading in ("Distributions as substitutes", "Conversion methods", "Kernels", "Choosing"):
+        assert f"## {heading}" in out
+    assert "being rational buys" in out
+    tables = [line for line in out.splitlines() if line.startswith("| ---")]
+    assert len(tables) == 3
+
+
+def test_picture_and_permissions(quick):
+    with Image.open(quick[0]["png"]) as image:
+        assert image.width > 1000
+    mask = os.umask(0)
+    os.umask(mask)
+    assert stat.S_IMODE(quick[0]["csv"].stat().st_mode) == 0o666 & ~mask
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--csv", "no/such/place.csv"), "not an existing directory"),
+        (("--png", "."), "Is a directory"),
+        (("--csv", "a", "--json", "./a"), "each its own file"),
+        (("--reference", "bekmann"), "did you mean beckmann"),
+        (("--reference", "ashikhmin-shirley"), "name that"),
+        (("--parameter", "-1"), "m_B > 0"),
+        (("--reference", "ggx", "--parameter", "2"), "0 < α ≤ 1"),
+        (("--from", "ggx"), "nothing to convert"),
+        (("--to", "ggx:roughness"), "unknown distribution"),
+    ],
+)
+def test_mistakes_are_told_before_anything_is_measured(options, words, tmp_path):
+    status, out, err = run("bench", *options, cwd=tmp_path)
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert words in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_terminal():
+    assert "Examples:" in run("bench", "--help")[1]
+    status, out = run_on_terminal("bench", "--nonsense")
+    assert status == 2
+    assert "no such option" in out
+
+
+@pytest.mark.parametrize(("source", "given"), [("beckmann", 0.2), ("ggx", 1.0)])
+def test_energy_error_is_the_least_share_of_the_light(source, given):
+    entry = mdfconv.distribution(source)
+    found = substitutes(entry, np.array([given]), one_parameter_distributions(), TINY, ignore)
+    beta = (np.arange(200_000) + 0.5) * np.pi / 400_000
+    wanted = entry.normalized(beta, given)
+
+    def share(log_parameter, name):
+        got = mdfconv.distribution(name).normalized(beta, np.exp(log_parameter))
+        weight = np.sin(2 * beta)
+        return np.sqrt(np.sum(weight * (got - wanted) ** 2) / np.sum(weight * wanted**2))
+
+    rows = {row.distribution: row for row in found}
+    assert rows[source].rmse == rows[source].energy_error == 0
+    for name, near in (("ggx", 0.18), ("blinn-phong", 50.0), ("sawicki", 60.0)):
+        if source == "beckmann":
+            bounds = np.log([near / 2, near * 2])
+            least = minimize_scalar(share, bounds=bounds, args=(name,), method="bounded").fun
+            assert rows[name].energy_error == pytest.approx(least, rel=1e-4)
+            answer = mdfconv.explain(given, source, name, "fit")[0]
+            assert rows[name].parameter == answer.result
+            assert (rows[name].rmse, rows[name].max_error) == (answer.rmse, answer.max_error)
+    # A uniform GGX has no Gaussian; its time is measured all the same.
+    if source == "ggx":
+        assert np.isnan(rows["gauss"].parameter)
+        assert np.isnan([rows["gauss"].rmse, rows["gauss"].energy_error]).all()
+        assert rows["gauss"].ns["float32"].median > 0
+
+
+@pytest.mark.parametrize("name", list_metrics())
+def test_loop_of_curve_fit_finds_the_same_minimum(name):
+    source, target = map(mdfconv.distribution, ("beckmann", "ggx"))
+    values = sweep(source, 3)
+    assert values[[0, -1]] == pytest.approx([0.0044721, 0.44721], rel=1e-4)
+    looped = curve_fit_loop(source, values, target, metric(name))
+    fitted = answers(find_method("fit"), values, source, target, metric(name))
+    # Its samples do not end where a screen clips to white.
+    tolerance = 1e-3 if name == "display" else 1e-5
+    np.testing.assert_allclose(looped, fitted, rtol=tolerance)
+
+
+@pytest.mark.parametrize(
+    ("source", "target"),
+    [("beckmann", "blinn-phong"), ("ggx", "smoothie"), ("sawicki", "schlick"), ("gauss", "gtr")],
+)
+def test_methods_of_any_pair(source, target):
+    found = method_speeds(*map(mdfconv.distribution, (source, target)), TINY, ignore)
+    methods = {row.method for row in found}
+    assert ("ward" in methods) == (source in ("beckmann", "ggx"))
+    fits = [row for row in found if row.method == "fit"]
+    assert [row.metric for row in fits] == list_metrics()
+    assert all(row.parameter_error_max == 0 and row.answered == 1 for row in fits)
+    closed = next(row for row in found if row.method == "closed-form")
+    assert closed.metric == "unit"
+    assert closed.rmse_max >= closed.rmse
+    assert closed.values in (TINY.conversions, TINY.fits)
+
+
+def test_front():
+    points = [(3.0, 0.0), (1.0, 0.2), (2.0, 0.3), (np.nan, 0.0), (1.05, 0.1), (9.0, np.nan)]
+    assert front(points) == [1, 4, 0]
+    assert front(points, tie=0.1) == [4, 0]
+    assert front([]) == []
+
+
+def test_interleaving_counts_rounds_but_the_first():
+    calls, steps = [], []
+    functions = {name: lambda name=name: calls.append(name) for name in "abc"}
+    times = interleave(functions, 4, steps.append)
+    assert sorted(calls) == sorted("abc" * 5)
+    assert steps == [1] * 5
+    assert [samples.size for samples in times.values()] == [4] * 3
+    assert spread(np.array([1.0, 2.0, 3.0, 4.0, 5.0])) == (3, 2, 4)
+
+
+def test_labels_keep_out_of_each_others_way():
+    figure, axes = pyplot().subplots()
+    x, y = [1.0, 1.05, 1.001, 3.0], [1.0, 1.0, 1.0, 2.0]
+    axes.plot(x, y, "o")
+    figure.canvas.draw()
+    place_labels(axes, x, y, ["one", "two", "three", "four"])
+    figure.canvas.draw()
+    assert [text.get_text() for text in axes.texts] == ["one, three", "two", "four"]
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+    pyplot().close(figure)

@@ -1,0 +1,138 @@
+"""``mdfconv recommend``: the choice, and the command as a process."""
+
+import csv
+import io
+import json
+
+import pytest
+
+import mdfconv
+from mdfconv.benchmark.recommendation import Candidate, choose
+from tests.cli.runner import run, run_on_terminal
+
+
+def candidate(name, ns, operations, error):
+    return Candidate(name, 0.1, "fit", ns, operations, error / 2, error)
+
+
+SOURCE = Candidate("beckmann", 0.2, "none", 2.0, 17, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "chosen"),
+    [(0.1, "few"), (0.05, "quick"), (0.02, "near"), (0.005, "beckmann"), (1e-9, "beckmann")],
+)
+def test_cheapest_within_the_tolerance(tolerance, chosen):
+    candidates = [
+        SOURCE,
+        candidate("quick", 1.0, 20, 0.04),
+        candidate("few", 1.09, 5, 0.08),
+        candidate("slow", 4.0, 1, 0.01),
+        candidate("near", 1.5, 20, 0.01),
+        candidate("also", 1.5, 20, 0.02),
+    ]
+    assert choose(candidates, tolerance).distribution == chosen
+    assert choose(candidates[::-1], tolerance).distribution == chosen
+
+
+def answer(*arguments):
+    status, out, err = run("recommend", *arguments, "--format", "json")
+    assert (status, err) == (0, "")
+    return json.loads(out)
+
+
+def test_answer_is_within_the_tolerance_and_explained():
+    found = answer("--from", "beckmann", 0.2, "--tolerance", 0.05)
+    first, *rest = found["candidates"]
+    assert found["chosen"] == first["distribution"]
+    assert first["chosen"]
+    assert not any(row["chosen"] for row in rest)
+    within = [row for row in found["candidates"] if row["within"]]
+    # The shape of Beckmann is not GGX's, whatever the machine.
+    assert {row["distribution"] for row in within} == {
+        "beckmann", "gauss", "blinn-phong", "sawicki",
+    }  # fmt: skip
+    assert all((row["max_error"] <= 0.05) == row["within"] for row in found["candidates"])
+    assert found["candidates"][: len(within)] == within
+    assert first["distribution"] in found["reason"]
+    for row in found["candidates"]:
+        if row["method"] != "none":
+            name, method = row["distribution"], row["method"]
+            same = mdfconv.explain(0.2, "beckmann", name, method)[0]
+            assert row["parameter"] == pytest.approx(same.result, rel=1e-12)
+            assert row["max_error"] == pytest.approx(same.max_error, rel=1e-9)
+            assert row["rmse"] == pytest.approx(same.rmse, rel=1e-9)
+
+
+def test_nothing_else_is_near_enough():
+    found = answer("--from", "beckmann", 0.2, "--tolerance", 1e-4)
+    assert found["chosen"] == "beckmann"
+    assert found["candidates"][0]["method"] == "none"
+    assert found["reason"].startswith("keep beckmann: nothing else")
+
+
+def test_metric_and_encoding():
+    found = answer("--from", "ggx:roughness", 0.5, "--metric", "display", "--exposure", 2)
+    assert found["from"] == "ggx:roughness"
+    row = next(row for row in found["candidates"] if row["distribution"] == "ggx")
+    assert row["parameter"] == 0.25
+    # Smoothie and GTR with γ = 2 are GGX: as near as the source, though not as few operations.
+    assert {row["distribution"] for row in found["candidates"] if row["within"]} == {
+        "ggx", "gtr", "smoothie",
+    }  # fmt: skip
+    other = next(row for row in found["candidates"] if row["distribution"] == "beckmann")
+    same = mdfconv.explain(0.25, "ggx", "beckmann", "fit", metric="display", exposure=2)[0]
+    assert other["max_error"] == pytest.approx(same.max_error, rel=1e-6)
+
+
+def test_plain_in_a_pipe():
+    status, out, err = run("recommend", "--from", "phong", 100, "--tolerance", 1e-6)
+    assert (status, out) == (0, "blinn-phong 100 none\n")
+    assert err == "mdfconv: keep blinn-phong: nothing else stays within 1e-06 of its peak.\n"
+
+
+def test_csv_and_markdown():
+    arguments = ("recommend", "--from", "beckmann", 0.2, "--tolerance", 1e-6, "--format")
+    status, out, _ = run(*arguments, "csv")
+    assert status == 0
+    rows = list(csv.DictReader(io.StringIO(out)))
+    assert [row["chosen"] for row in rows] == ["True"] + ["False"] * 7
+    assert rows[0]["distribution"] == "beckmann"
+    status, out, err = run(*arguments, "markdown")
+    assert (status, err) == (0, "")
+    assert out.splitlines()[2].startswith("| beckmann | 0.2 | none |")
+    assert out.endswith("Keep beckmann: nothing else stays within 1e-06 of its peak.\n")
+
+
+def test_table_on_a_terminal():
+    status, out = run_on_terminal("recommend", "--from", "beckmann", "0.2", "--tolerance", "1e-6")
+    assert status == 0
+    row = next(line for line in out.splitlines() if "none" in line)
+    assert "\x1b[1m" in row
+    assert "beckmann" in row
+    assert "Keep beckmann" in out
+    assert "Examples:" in run("recommend", "--help")[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--from", "beckmann", 0.2, "--tolerance", 0), "a number above 0, not 0"),
+        (("--from", "beckmann", 0.2, "--tolerance", -1), "a number above 0, not -1"),
+        (("--from", "beckmann", 0.2, "--tolerance", "nan"), "a number above 0, not nan"),
+        (("--from", "beckmann", 0.2, "--tolerance", "inf"), "a number above 0, not inf"),
+        (("--from", "beckmann", -0.2), "m_B > 0"),
+        (("--from", "beckmann", "nan"), "not a finite number"),
+        (("--from", "bekmann", 0.2), "did you mean beckmann"),
+        (("--from", "gauss:roughness", 0.2), "gauss has no encoding"),
+        (("--from", "ashikhmin-shirley", 100), "name that"),
+        (("--from", "beckmann", "100,20"), "not a valid float"),
+        (("--from", "beckmann", 0.2, "--metric", "shape"), "unknown metric"),
+        ((0.2,), "Missing option '--from'"),
+    ],
+)
+def test_mistakes(arguments, words):
+    status, out, err = run("recommend", *arguments)
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert words in err

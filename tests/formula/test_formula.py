@@ -1,0 +1,225 @@
+"""Formulas to paste: compiled, run and validated as their users would."""
+
+import ctypes
+import itertools
+import math
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from mdfconv.conversion.endpoint import endpoint
+from mdfconv.errors import MdfconvError
+from mdfconv.fitting.core import fit
+from mdfconv.fitting.metrics import metric
+from mdfconv.formula import Problem, cheapest, pareto_front, write_formula
+from tests.cli.runner import run
+
+# What the machine has: `.ci/run` installs both.
+COMPILERS = [name for name in ("gcc",) if shutil.which(name)]
+VALIDATORS = [name for name in ("glslangValidator",) if shutil.which(name)]
+CASES = [
+    ("beckmann", "ggx", "unit", 0.01, 0.8, 1e-2),
+    ("blinn-phong", "ggx:roughness", "energy", 1, 1e4, 1e-2),
+    ("ggx", "blinn-phong", "energy", 0.02, 0.9, 1e-4),
+    ("ggx:roughness", "beckmann:glossiness", "display", 0.2, 0.8, 1e-3),
+    ("ggx:glossiness", "sawicki", "unit", 0.2, 0.9, 3e-5),
+    ("sawicki", "gauss", "energy", 2, 1e6, 1e-4),
+    ("schlick", "smoothie", "unit", 0.01, 0.7, 1e-3),
+]
+
+
+@pytest.fixture(scope="module", params=CASES, ids=lambda case: f"{case[0]}-{case[1]}")
+def found(request):
+    source, target, kept, low, high, tolerance = request.param
+    problem = Problem(endpoint(source), endpoint(target), metric(kept), low, high)
+    return problem, cheapest(problem, tolerance), tolerance
+
+
+def exact(problem, values):
+    """Return stored values of the target by the fit, for float32 values of the source."""
+    given = problem.source.decode(values.astype(float))
+    pair = problem.source.distribution, problem.target.distribution
+    return problem.target.encode(fit(pair[0], given, pair[1], problem.metric).parameter)
+
+
+def values_in(problem):
+    values = np.geomspace(problem.low, problem.high, 97).astype(np.float32)
+    return np.clip(values, np.float32(problem.low), np.float32(problem.high))
+
+
+def worst(problem, got, wanted):
+    """Return the worst relative error, of 1 − g for a glossiness."""
+    encoding = problem.target.encoding
+    if encoding and encoding.name == "glossiness":
+        got, wanted = 1 - got, 1 - wanted
+    return np.max(np.abs(got / wanted - 1))
+
+
+def function_name(code):
+    return code.split("float ")[1].split("(")[0]
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_c_compiles_runs_and_keeps_its_word(found, tmp_path, compiler):
+    problem, formula, tolerance = found
+    assert formula.error <= tolerance
+    code = write_formula(formula, problem, "c")
+    (tmp_path / "formula.c").write_text(code)
+    flags = [
+        "-Wall",
+        "-Wextra",
+        "-Wdouble-promotion",
+        "-Werror",
+        "-std=c99",
+        "-O2",
+        "-shared",
+        "-fPIC",
+    ]
+    subprocess.run(
+        [compiler, *flags, "formula.c", "-o", "formula.so", "-lm"], cwd=tmp_path, check=True
+    )
+    call = getattr(ctypes.CDLL(str(tmp_path / "formula.so")), function_name(code))
+    call.argtypes, call.restype = [ctypes.c_float], ctypes.c_float
+    values = values_in(problem)
+    got = np.array([call(value) for value in values.tolist()])
+    assert worst(problem, got, exact(problem, values)) <= formula.error * 1.02 + 3e-7
+
+
+def test_python_runs_on_numbers_and_arrays(found):
+    problem, formula, _ = found
+    code = write_formula(formula, problem, "python")
+    scope = {}
+    exec(code, scope)
+    function = scope[code.split("def ")[1].split("(")[0]]
+    values = values_in(problem)
+    got = function(values.astype(float))
+    assert worst(problem, got, exact(problem, values)) <= formula.error * 1.02 + 3e-7
+    assert function(float(values[5])) == pytest.approx(got[5], rel=1e-12)
+
+
+@pytest.mark.parametrize("validator", VALIDATORS)
+def test_shaders_validate(found, tmp_path, validator):
+    problem, formula, _ = found
+    glsl = write_formula(formula, problem, "glsl")
+    name = function_name(glsl)
+    source = f"#version 310 es\nprecision highp float;\n{glsl}\nlayout(location = 0) in float x;\n"
+    source += f"layout(location = 0) out vec4 color;\nvoid main() {{ color = vec4({name}(x)); }}\n"
+    (tmp_path / "formula.frag").write_text(source)
+    hlsl = write_formula(formula, problem, "hlsl")
+    hlsl += f"\nfloat4 main(float x : TEXCOORD0) : SV_Target {{ return {name}(x).xxxx; }}\n"
+    (tmp_path / "formula.hlsl").write_text(hlsl)
+    for words in (["formula.frag"], ["-D", "-V", "-S", "frag", "-e", "main", "formula.hlsl"]):
+        done = subprocess.run(
+            [validator, *words], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stdout
+        assert "WARNING" not in done.stdout
+
+
+def test_latex_says_the_same(found):
+    problem, formula, _ = found
+    text = write_formula(formula, problem, "latex").splitlines()[-1]
+    assert text.count("{") == text.count("}")
+    assert text.count(r"\left(") == text.count(r"\right)")
+    for coefficient in formula.numerator:
+        assert str(np.float32(abs(coefficient))).partition("e")[0] in text
+
+
+def test_the_comment_states_what_was_promised(found):
+    problem, formula, _ = found
+    code = write_formula(formula, problem, "c")
+    assert code.isascii()
+    assert f"for {problem.low:g} to {problem.high:g}" in code
+    assert f"the {problem.metric.name} metric" in code
+    assert f"{formula.error:.2g} in float32" in code
+    assert f"{formula.shape.operations} operations" in code
+
+
+def test_operations_are_those_of_the_code(found):
+    problem, formula, _ = found
+    lines = write_formula(formula, problem, "glsl").splitlines()
+    body = " ".join(line for line in lines if line.startswith("    "))
+    cheap = sum(body.count(f" {sign} ") for sign in "+-*")
+    slow = body.count(" / ") + body.count("sqrt(")
+    glossy = sum(
+        bool(side.encoding) and side.encoding.name == "glossiness"
+        for side in (problem.source, problem.target)
+    )
+    assert cheap + 4 * slow == formula.shape.operations + glossy
+
+
+def test_no_formula_of_the_front_is_beaten():
+    problem = Problem(endpoint("blinn-phong"), endpoint("ggx"), metric("energy"), 1, 1e4)
+    front = pareto_front(problem)
+    prices = [formula.shape.operations for formula in front]
+    errors = [formula.error for formula in front]
+    assert prices == sorted(set(prices))
+    assert all(later < 0.9 * former for former, later in itertools.pairwise(errors))
+    # 1/√(a N + b): what the paper's closed form looks like, with the light's coefficients.
+    simple = next(formula for formula in front if formula.error < 1e-2)
+    assert (simple.shape.outer, simple.shape.numerator, simple.shape.denominator) == (-0.5, 2, 0)
+    assert cheapest(problem, 1e-2) == simple
+
+
+def test_coefficients_are_nearly_minimax():
+    """A polynomial is compared with the exact minimax one, from linear programming."""
+    from scipy.optimize import linprog
+
+    problem = Problem(endpoint("beckmann"), endpoint("gauss"), metric("energy"), 0.01, 0.7)
+    w, t = problem.samples
+    front = {f.shape: f for f in pareto_front(problem)}
+    shape, formula = next(
+        (s, f) for s, f in front.items() if s.outer == 1 and not s.denominator and s.numerator == 3
+    )
+    columns = w[:, None] ** (shape.factor + shape.variable * np.arange(3)) / t[:, None]
+    ones = np.ones((w.size, 1))
+    limits = np.concatenate([np.hstack([columns, -ones]), np.hstack([-columns, -ones])])
+    bounds = np.concatenate([np.ones(w.size), -np.ones(w.size)])
+    least = linprog([0, 0, 0, 1], limits, bounds, bounds=[(None, None)] * 4).fun
+    assert least * 0.999 <= formula.error <= least * 1.05
+
+
+def test_tolerances_that_cannot_be_met_say_what_can():
+    problem = Problem(endpoint("beckmann"), endpoint("ggx"), metric("unit"), 0.01, 1)
+    with pytest.raises(MdfconvError, match=r"no formula is within 1e-08 in float32; the most acc"):
+        cheapest(problem, 1e-8)
+    for bad in (0.0, -1.0, math.nan):
+        with pytest.raises(MdfconvError, match="a tolerance is positive"):
+            cheapest(problem, bad)
+
+
+def test_command():
+    words = ["formula", "--from", "blinn-phong", "--to", "ggx:roughness", "--metric", "energy"]
+    status, out, err = run(*words)
+    assert (status, err) == (0, "")
+    assert out.startswith("// blinn-phong N to ggx:roughness r, for 1 to 10000.\n")
+    assert "inversesqrt" in out
+    assert "rsqrt" in run(*words, "--lang", "HLSL")[1]
+    status, out, err = run(*words, "--all")
+    assert status == 0
+    assert out.startswith("operations,worst_error,formula\n")
+    assert len(out.splitlines()) > 5
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--lang", "rust"], "unknown language 'rust'"),
+        (["--range", "1"], "--range is LO:HI"),
+        (["--range", "5:5"], "the range 5:5 is empty"),
+        (["--range=-1:5"], "blinn-phong N = -1"),
+        (["--tolerance", "0"], "a tolerance is positive"),
+        (["--tolerance", "1e-12"], "the most accurate reaches"),
+        (["--to", "blinn-phong"], "a formula needs two distributions"),
+        (["--to", "sawicki", "--range", "0.001:10"], "the fit has no answer in sawicki"),
+        (["--format", "csv"], "--format is the form of the table of --all"),
+    ],
+)
+def test_mistakes(words, message):
+    both = ["--from", "blinn-phong", *([] if "--to" in words else ["--to", "ggx"]), *words]
+    status, out, err = run("formula", *both)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert len(err.splitlines()) == 1

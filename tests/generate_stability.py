@@ -1,0 +1,291 @@
+"""Write the reference values of `mdfconv stability`: run as `python -m tests.generate_stability`.
+
+Everything is computed from the printed formulas at 60 digits and stored with far more than the
+type at hand resolves, for inputs that the type represents exactly. The same run always writes the
+same files.
+"""
+
+import csv
+from pathlib import Path
+
+import mpmath as mp
+import numpy as np
+
+from tests import oracles, stability_fits
+
+DATA = Path(__file__).parents[1] / "mdfconv" / "benchmark" / "data"
+# Significant digits that keep a reference far below the rounding of each type.
+DIGITS = {np.float64: 19, np.float32: 10, np.float16: 7}
+# Below the smallest subnormal number: no type can tell it from 0.
+NOTHING = mp.mpf("1e-330")
+# A value below this has an exponent that multiplies the rounding: a regime of its own.
+TAIL = mp.mpf("1e-6")
+EDGE = "edge of support"
+
+NAMES = ["beckmann", "gauss", "ggx", "gtr", "blinn-phong", "schlick", "sawicki", "smoothie"]
+GAMMAS = {"gtr": [1.5, 4]}
+NEAR_ONE = ["1", *(f"{sign}{step}" for step in ("1e-12", "1e-6", "1e-3") for sign in "+-")]
+
+USUAL = {"alpha": [0.01, 0.1, 0.5, 1], "exponent": [1, 7.3, 100, 20000]}
+MIRROR = {"alpha": [1e-8, 1e-5, 1e-3], "exponent": [60000, 1e10, 1e16]}
+GRAZING = {"alpha": [0.05, 0.3, 1], "exponent": [0.01, 1, 2.5, 20]}
+OFF_AXIS = [0.70711, 0.75, 1, 1.5, 3, 100, 1e5]
+NEARLY_UNIFORM = [1e-6, 0.05, 0.5, "1-1e-12", 1]
+EDGES = [1e-4, 0.05, 0.3, 0.9, 0.999]
+FROM_EDGE = ["1e-1", "1e-3", "1e-6", "1e-9", "1e-11", "1e-13", "1e-14", "1e-15"]  # relative
+# Of the width of the lobe, and from the horizon.
+MULTIPLES = [1e-3, 0.1, 0.5, 1, 2, 3, 5, 8, 20, 1e3, 1e6]
+FROM_HORIZON = [0.1, 1e-2, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 0]
+
+
+def kind(name):
+    return "exponent" if name in oracles.EXPONENTS else "alpha"
+
+
+def in_type(values, dtype):
+    """Return the values rounded to a type, each once; not those that it only holds as 0 or inf."""
+    with np.errstate(over="ignore"):
+        rounded = dict.fromkeys(dtype(value) for value in values)
+    limits = np.finfo(dtype)
+    return [v for v in rounded if limits.smallest_normal <= v <= limits.max]
+
+
+def width(name, parameter):
+    """Return roughly the angle at which a lobe has fallen to 1/e."""
+    return np.sqrt(2 / parameter) if kind(name) == "exponent" else min(parameter, 1)
+
+
+def lobe_angles(name, parameter, dtype):
+    beta = float(width(name, float(parameter))) * np.array(MULTIPLES)
+    return [dtype(0), *in_type(beta[beta <= np.pi / 2], dtype)]
+
+
+def grazing_angles(dtype):
+    return in_type([np.pi / 2 - distance for distance in FROM_HORIZON], dtype)
+
+
+def edge_angles(parameter, dtype):
+    """Return angles on both sides of the edge of Schlick's support, cos β = 1 − m."""
+    edge = 2 * mp.asin(mp.sqrt(mp.mpf(float(parameter)) / 2))
+    sides = [edge * (1 + sign * mp.mpf(step)) for step in FROM_EDGE for sign in (1, -1)]
+    return in_type([float(side) for side in (edge, *sides) if side < oracles.HALF_PI], dtype)
+
+
+def off_axis_angles(parameter, dtype):
+    mode = np.arctan(np.sqrt(max(2 * float(parameter) ** 2 - 1, 0)))
+    near = mode * np.array([0.5, 0.99, 1, 1.01])
+    return [dtype(0), *in_type([*near[near < np.pi / 2], *grazing_angles(dtype)], dtype)]
+
+
+def unit(name, beta, parameter, gamma):
+    """Return D̄, even across the horizon, of which float32's π/2 lies on the far side."""
+    angle = mp.mpf(float(beta))
+    angle = min(angle, mp.pi - angle)
+    value = oracles.ratio_mp(name, angle, float(parameter), float(gamma))
+    return value / oracles.maximum(name, float(parameter))
+
+
+def kernel_inputs(name, dtype):
+    """Yield regime, parameter, gamma and β of the unit form."""
+    for gamma in in_type(GAMMAS.get(name, [2]), dtype):
+        for parameters, regime in ((USUAL, "usual"), (MIRROR, "mirror-smooth")):
+            for parameter in in_type(parameters[kind(name)], dtype):
+                for beta in lobe_angles(name, parameter, dtype):
+                    yield regime, parameter, gamma, beta
+        for parameter in in_type(GRAZING[kind(name)], dtype):
+            for beta in grazing_angles(dtype):
+                yield "grazing", parameter, gamma, beta
+    yield from special_inputs(name, dtype)
+
+
+def special_inputs(name, dtype):
+    """Yield what only some distributions have."""
+    if name == "beckmann":
+        for parameter in in_type(OFF_AXIS, dtype):
+            for beta in off_axis_angles(parameter, dtype):
+                yield "off-axis maximum", parameter, 2, beta
+    if name == "schlick":
+        for parameter in in_type(EDGES, dtype):
+            for beta in edge_angles(parameter, dtype):
+                yield EDGE, parameter, 2, beta
+    if name == "gtr":
+        for gamma, alpha in near_one(dtype):
+            for beta in in_type([float(alpha), min(20 * float(alpha), 1.5)], dtype):
+                yield "γ near 1", alpha, gamma, beta
+
+
+def near_one(dtype):
+    gammas = in_type([sum_of(text) for text in NEAR_ONE], dtype)
+    return [(g, a) for g in gammas for a in in_type(map(sum_of, NEARLY_UNIFORM), dtype)]
+
+
+def sum_of(text):
+    """Return the float for a number, or for a text such as 1-1e-6 or +1e-6 (from 1)."""
+    if not isinstance(text, str) or text == "1":
+        return float(text)
+    return float(1 + mp.mpf(text.removeprefix("1")))
+
+
+def normal_inputs(name, dtype):
+    """Yield regime, parameter and gamma of the normalized form at β = 0."""
+    for gamma in in_type(GAMMAS.get(name, [2]), dtype):
+        extremes = OFF_AXIS if name in ("beckmann", "gauss", "smoothie") else []
+        values = [*USUAL[kind(name)], *MIRROR[kind(name)], *extremes]
+        for parameter in in_type(values, dtype):
+            yield "at the normal", parameter, gamma
+    if name == "gtr":
+        for gamma, alpha in near_one(dtype):
+            yield "γ near 1", alpha, gamma
+
+
+def kernels(dtype):
+    """Yield the rows of one type."""
+    for name in NAMES:
+        for regime, parameter, gamma, beta in dict.fromkeys(kernel_inputs(name, dtype)):
+            value = unit(name, beta, parameter, gamma)
+            if regime != EDGE and np.finfo(dtype).smallest_normal <= value < TAIL:
+                regime = "tail"
+            yield kernel_row(name, "unit", regime, parameter, gamma, beta, value, dtype)
+        for regime, parameter, gamma in dict.fromkeys(normal_inputs(name, dtype)):
+            value = oracles.at_normal(name, float(parameter), float(gamma))
+            yield kernel_row(name, "normalized", regime, parameter, gamma, dtype(0), value, dtype)
+
+
+def kernel_row(name, form, regime, parameter, gamma, beta, value, dtype):
+    return {
+        "distribution": name,
+        "form": form,
+        "regime": regime,
+        "parameter": short(parameter),
+        "gamma": short(gamma) if name == "gtr" else "",
+        "beta": short(beta),
+        "value": "0" if value < NOTHING else mp.nstr(value, DIGITS[dtype]),
+    }
+
+
+def short(value):
+    """Return the shortest text that reads back as the number, in the number's own type."""
+    text = str(value).removesuffix(".0")
+    assert type(value)(text) == value
+    return text
+
+
+ENDS = {
+    "beckmann": [0.7, 1, 3],
+    "gauss": [0.7, 1, 1.5],
+    "ggx": [0.5, 0.8, 0.99],
+    "gtr": [0.5, 0.75, 0.99],
+    "blinn-phong": [0.1, 1, 10],
+    "schlick": [0.5, 0.9, 1],
+    "sawicki": [0.1, 1, 10],
+    "smoothie": [0.5, 2, 100],
+}
+SMOOTH_ENDS = {"alpha": [1e-8, 1e-6, 1e-4], "exponent": [1e16, 1e12, 1e8]}
+GTR_GAMMA = 1.5
+
+
+def conversions():
+    """Yield a row for every method, source and value: the exact results in every target.
+
+    The values are float32's, so that they are the same numbers in both types.
+    """
+    methods = {"closed-form": closed_form, "half-angle": half_angle, "peak": peak, "ward": ward}
+    for method, exact in methods.items():
+        for source in NAMES:
+            ends = {"mirror-smooth": SMOOTH_ENDS[kind(source)], "rough": ENDS[source]}
+            for regime, values in ends.items():
+                for value in map(np.float32, values):
+                    found = {t: exact(source, t, float(value)) for t in NAMES if t != source}
+                    if any(result is not None for result in found.values()):
+                        cells = {t: conversion_text(found.get(t)) for t in NAMES}
+                        yield {
+                            "method": method,
+                            "source": source,
+                            "regime": regime,
+                            "gamma": GTR_GAMMA,
+                            "value": short(value),
+                        } | cells
+
+
+def conversion_text(value):
+    return "" if value is None else mp.nstr(value, 20)
+
+
+def legal(target, value):
+    """Return a result, or None where the target's legal range does not hold it."""
+    upper = 1 if target in ("ggx", "gtr", "schlick") else mp.inf
+    return value if mp.im(value) == 0 and 0 < mp.re(value) <= upper else None
+
+
+def closed_form(source, target, value):
+    if "gtr" in (source, target):
+        return None
+    if source == "sawicki" and (mp.mpf(value) - mp.mpf("0.3")) / mp.mpf("1.174") <= 0:
+        return None
+    result = oracles.closed_form(source, target, value)
+    through_phong = target == "sawicki" and source != "blinn-phong"
+    if through_phong and mp.re(result) <= mp.mpf("0.3"):
+        return None
+    return legal(target, result)
+
+
+def ward(source, target, value):
+    names = {"beckmann": "m", "schlick": "m", "blinn-phong": "n"}
+    if names.get(source, target) == names.get(target, source):
+        same = {source, target} == {"beckmann", "schlick"}
+        return legal(target, mp.mpf(value)) if same else None
+    if not {source, target} <= names.keys():
+        return None
+    two_over = 2 / mp.mpf(value)
+    return legal(target, two_over / value if names[source] == "m" else mp.sqrt(two_over))
+
+
+def half_angle(source, target, value):
+    beta_half = oracles.half_width(source, value, GTR_GAMMA)
+    return beta_half and oracles.from_half_width(target, beta_half, GTR_GAMMA)
+
+
+def peak(source, target, value):
+    """Return the parameter with the same D(0)."""
+    at_normal = oracles.at_normal(source, value, GTR_GAMMA)
+    square = 1 / (mp.pi * at_normal)
+    results = {
+        "blinn-phong": lambda: 2 / square - 2,
+        "sawicki": lambda: 8 / (3 * square) - 3,
+        "smoothie": lambda: mp.sqrt(4 * square / (1 - square)) if square < 1 else mp.mpf(0),
+        "gauss": lambda: same_peak("gauss", at_normal),
+        "gtr": lambda: same_peak("gtr", at_normal),
+    }
+    # Every distribution is at least as high as one that is 1/π everywhere.
+    if target in ("gauss", "gtr") and square >= 1:
+        return None
+    return legal(target, results.get(target, lambda: mp.sqrt(square))())
+
+
+def same_peak(target, at_normal):
+    def excess(log_parameter):
+        return mp.log(oracles.at_normal(target, mp.exp(log_parameter), GTR_GAMMA) / at_normal)
+
+    start = mp.log(1 / (mp.pi * at_normal)) / 2
+    return mp.exp(mp.findroot(excess, (start, start + mp.mpf("0.01"))))
+
+
+def write(name, rows):
+    rows = list(rows)
+    with open(DATA / name, "w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    print(f"{name}: {len(rows)} rows, {(DATA / name).stat().st_size} bytes")
+
+
+def main():
+    """Write the files."""
+    for dtype in DIGITS:
+        write(f"kernels-{np.dtype(dtype).name}.csv", kernels(dtype))
+    write("conversions.csv", conversions())
+    write("fits.csv", stability_fits.rows())
+
+
+if __name__ == "__main__":
+    main()

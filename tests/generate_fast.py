@@ -26,6 +26,8 @@ TARGETS = (*SOURCES, "smoothie")
 TOLERANCE = {"unit": 5e-8, "energy": 5e-8, "display": 2e-5}
 # The roughest source of each kind; towards a uniform lobe both ends are singular.
 ROUGHEST = {"blinn-phong": 0.1, "sawicki": 0.1, "schlick": 1 - 1e-6}
+# What stays short of uniform has no such end.
+BOUNDED = ("beckmann",)
 LEAST_TARGET = {"sawicki": 0.01}
 NODES = 32
 MOST_TERMS = 25
@@ -81,7 +83,8 @@ def boundary(inside, low, high):
 def outline(pair):
     """Return the end of the range and the x at which the fit is known not to be smooth."""
     source, target = pair.names
-    end = float(fast.SIDES[source].reach(np.float64(ROUGHEST.get(source, 1.0))))
+    roughest = 1.0 if target in BOUNDED and source == "schlick" else ROUGHEST.get(source, 1.0)
+    end = float(fast.SIDES[source].reach(np.float64(roughest)))
     if pair.factored and source == "ggx":
         end = 1 - 1e-9
     grid = end * np.linspace(0, 1, 129)[1:]
@@ -151,6 +154,15 @@ def pieces(pair, low, high, depth=0):
     yield from pieces(pair, middle, high, depth + 1)
 
 
+def errors_of(pair, end):
+    """Return RMSE and maximum error of the fit at the places where they are stored."""
+    x = end * fast.ERROR_PLACES
+    # The end itself may be uniform.
+    x[-1] *= 1 - 1e-9
+    given = pair.given(x)
+    return np.stack(residual(pair.source, given, pair.target, pair.answer(x), pair.metric))
+
+
 def make(key):
     """Return one map and what there is to say of it."""
     name, source, target = key.split()
@@ -158,15 +170,13 @@ def make(key):
     end, breaks = outline(pair)
     ends = [0.0, *breaks, end]
     found = [piece for low, high in itertools.pairwise(ends) for piece in pieces(pair, low, high)]
-    x = end * np.linspace(0, 1, fast.ERROR_SAMPLES)
-    # The limit of smooth surfaces is reached long before this; the end itself may be uniform.
-    x[0], x[-1] = 1e-6, end * (1 - 1e-9)
-    given = pair.given(x)
-    errors = residual(pair.source, given, pair.target, pair.answer(x), pair.metric)
-    edges = np.array(
-        [low for low, *_ in found] + [1.0 if pair.factored and source == "ggx" else end]
-    )
-    entry = fast.Map(edges, tuple(power for _, _, power, _ in found), np.stack(errors))
+    if (source, target) == ("schlick", "ggx"):
+        # α is 1 here within the tolerance, whatever the little that is stored.
+        found.append((end, 1.0, pair.stored(end, pair.answer(end)), 0.0))
+        end = 1.0
+    last = 1.0 if pair.factored and source == "ggx" else end
+    edges = np.array([low for low, *_ in found] + [last])
+    entry = fast.Map(edges, tuple(power for _, _, power, _ in found), errors_of(pair, last))
     worst = max(piece[-1] for piece in found)
     sizes = [power.size for _, _, power, _ in found]
     return key, entry, f"to x = {end:.6f}, worst {worst:.1e}, terms {sizes}"

@@ -225,13 +225,14 @@ def _reason(
         for entry in _quickest(candidates, tolerance)
         if entry.distribution != chosen.distribution
     ]
-    tie = f", as quick as {' and '.join(rivals)} with no more operations" if rivals else ""
+    tie = f" ({' and '.join(rivals)} as quick, but for noise)" if rivals else ""
     if count == 1:
         return f"keep {source}: nothing else stays within {tolerance:g} of its peak."
     if chosen.method == NOT_CONVERTED:
         return f"keep {source}: of {count} within {tolerance:g} it is the cheapest{tie}."
     return (
         f"{chosen.distribution} stays within {tolerance:g} of the peak of {source} "
-        f"({chosen.max_error:.2g}) at {chosen.ns / own.ns:.2g} of its time, the cheapest of "
-        f"{count} that do{tie}; {chosen.method} is the cheapest conversion that keeps it there."
+        f"(maximum error {chosen.max_error:.2g}) at {chosen.ns / own.ns:.2g} of its time, the "
+        f"cheapest of {count} that do{tie}; {chosen.method} is the cheapest conversion that keeps "
+        "it there."
     )

@@ -85,7 +85,7 @@ def command(
     if format_ and not every:
         raise MdfconvError("--format is the form of the table of --all; a formula has --lang")
     sides = endpoint(source), endpoint(target)
-    low, high = _range(range_) if range_ else usual_range(sides[0])
+    low, high = usual_range(sides[0]) if range_ is None else _range(range_)
     problem = Problem(*sides, find_metric(metric, exposure), low, high)
     if every:
         title = f"Formulas from {sides[0].label} to {sides[1].label}, {low:g} to {high:g}"

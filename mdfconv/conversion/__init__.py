@@ -116,10 +116,22 @@ def convert(
     """
     sides = endpoint(source, gamma), endpoint(target, gamma)
     rule, measure = find_method(method), find_metric(metric, exposure)
-    if isinstance(values, tuple):
-        check_pair(values, *sides)
-        return tuple(convert(axis, *sides, rule.name, metric=measure) for axis in values)
-    operand = as_operand(values)
+    if not isinstance(values, tuple):
+        return _convert(as_operand(values), rule, measure, *sides)
+    check_pair(values, *sides)
+    x, y = (as_operand(axis) for axis in values)
+    try:
+        np.broadcast_shapes(np.shape(x), np.shape(y))
+    except ValueError:
+        raise MdfconvError(f"shapes {np.shape(x)} and {np.shape(y)} are not a pair") from None
+    return _convert(x, rule, measure, *sides), _convert(y, rule, measure, *sides)
+
+
+def _convert(
+    operand: Any, rule: Method, measure: Metric, source: Endpoint, target: Endpoint
+) -> Any:
+    """Convert an operand, in its shape and floating type."""
+    sides = source, target
     if rule.gaps_as_nan and np.ndim(operand):
         result = _apply_with_gaps(rule, measure, operand, *sides)
     else:
@@ -281,6 +293,6 @@ def _apply_with_gaps(
         f"{missing} of {given.size} values have no answer by {rule.name} from {source.label} to "
         f"{target.label} and are NaN, the first is {number_text(float(given.flat[first]))}",
         MdfconvWarning,
-        stacklevel=3,
+        stacklevel=4,
     )
     return np.where(answered, stored, np.nan)

@@ -60,12 +60,14 @@ def unreachable(
     wanted = target.distribution.parameter
     which = f" (value {index + 1} of {parameter.size})" if parameter.size > 1 else ""
     start = f"{source.distribution.name} {source.distribution.parameter.symbol}"
-    legal = wanted.legal
+    legal = f", outside {wanted.legal}"
     outcome = f"gives {_name(target)} {wanted.symbol} = {number_text(got)}"
     if np.isnan(got):
         outcome = f"has no answer in {_name(target)}"
+        covered = rule.range_text(source.distribution, target.distribution, measure)
+        legal = f": it covers {covered}" if covered else legal
     elif wanted.accepts(np.asarray(got)):
-        legal = target.stored.legal
+        legal = f", outside {target.stored.legal}"
         outcome += f", which {target.label} cannot store"
     answers = []
     for other in list_methods():
@@ -80,6 +82,6 @@ def unreachable(
         if target.stored.accepts(answer)[0]:
             answers.append(f"{other.name} answers {number_text(float(answer[0]))}")
     return MdfconvError(
-        f"for {start} = {number_text(given)}{which} {rule.name} {outcome}, outside {legal}; "
+        f"for {start} = {number_text(given)}{which} {rule.name} {outcome}{legal}; "
         + (" and ".join(answers) or "no method answers")
     )

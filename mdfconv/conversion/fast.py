@@ -25,9 +25,11 @@ from mdfconv.distributions.smoothie import to_ggx
 from mdfconv.fitting.metrics import Display, Metric
 
 DATA = "fast.npz"
-# The number of x, uniform from 0 to the end of a map's range, at which the errors are stored.
-ERROR_SAMPLES = 65
+# Where the errors are stored, as shares of the largest x of a map: between lobes that become alike
+# as they become smooth they fall like a power of x.
+ERROR_PLACES = np.union1d(np.geomspace(1e-4, 1, 49), np.linspace(0, 1, 49)[1:])
 _BLOCK = 8192
+_NO_ERROR = 1e-30
 
 
 @dataclass(frozen=True)
@@ -117,8 +119,8 @@ class Map:
         Where the pieces begin and end in x; the first edge is 0.
     coefficients : tuple of numpy.ndarray
         For each piece those of a polynomial in z, which runs from −1 to 1, constant first.
-    errors : numpy.ndarray, shape (2, ERROR_SAMPLES)
-        RMSE and maximum error of the conversion over x.
+    errors : numpy.ndarray, shape (2, n)
+        RMSE and maximum error of the conversion at ERROR_PLACES.
     """
 
     edges: Array
@@ -216,6 +218,8 @@ class Fast(Method):
     ) -> Array:
         """Evaluate the polynomials; NaN outside their range."""
         if self.is_exact(source, target):
+            if "smoothie" not in (source.name, target.name):
+                return parameter.copy()
             result: Array = target.from_peak_alpha(source.peak_alpha(parameter))
             return result
         found = _map(source, target, metric)
@@ -245,10 +249,19 @@ class Fast(Method):
         if self.is_exact(source, target) or self.route(source, target) is None:
             return super().residual(parameter, source, result, target, metric)
         found = _map(source, target, metric)
-        x = np.linspace(0, found.edges[-1], ERROR_SAMPLES)
-        reach = SIDES[source.name].reach(parameter)
-        rmse, maximum = (np.interp(reach, x, errors) for errors in found.errors)
+        share = np.log(SIDES[source.name].reach(parameter) / found.edges[-1])
+        rmse, maximum = (
+            np.exp(np.interp(share, np.log(ERROR_PLACES), np.log(np.maximum(errors, _NO_ERROR))))
+            for errors in found.errors
+        )
         return rmse, maximum
+
+    def range_text(self, source: Distribution, target: Distribution, metric: Metric) -> str:
+        """Return which parameters of the source the stored maps cover."""
+        x = _map(source, target, metric).edges[-1]
+        end = x if source.name == "gauss" else source.from_peak_alpha(x)
+        rises = source.parameter.name.startswith("exponent")
+        return f"{source.parameter.symbol} {'≥' if rises else '≤'} {float(end):.6g}"
 
 
 def _side(distribution: Distribution) -> Side | None:

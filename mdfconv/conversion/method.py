@@ -43,6 +43,10 @@ class Method(ABC):
         """Return whether the method can answer under a metric."""
         return True
 
+    def range_text(self, source: Distribution, target: Distribution, metric: Metric) -> str:
+        """Return which parameters of the source a method with a range of its own covers."""
+        return ""
+
     def residual(
         self,
         parameter: Array,

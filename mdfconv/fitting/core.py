@@ -237,8 +237,8 @@ def _candidates(problem: _Problem) -> Array:
     tangents = problem.tangent[:, None] * np.append(multiples, 1e6)
     scaled = target.from_half_tangent(np.minimum(tangents, 1e8))
     # Exponents fall as lobes widen.
-    falls = np.nanmin(scaled[0]) < scaled[0, 0]
-    widest = (np.nanmin if falls else np.nanmax)(scaled, axis=1, keepdims=True)
+    falls = np.fmin.reduce(scaled[0]) < scaled[0, 0]
+    widest = (np.fmin if falls else np.fmax).reduce(scaled, axis=1, keepdims=True)
     wide = widest / _WIDE if falls else widest * _WIDE
     if target.parameter.upper_closed:
         upper = target.parameter.upper

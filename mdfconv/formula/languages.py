@@ -12,6 +12,7 @@ import numpy as np
 
 from mdfconv import __version__
 from mdfconv.conversion.endpoint import Endpoint
+from mdfconv.distributions.parameter import number_text
 from mdfconv.fitting.metrics import Display
 from mdfconv.formula.family import Formula
 from mdfconv.formula.search import Problem, is_glossy
@@ -129,7 +130,7 @@ def _facts(formula: Formula, problem: Problem) -> list[str]:
     exposure = f" at exposure {metric.exposure:g}" if isinstance(metric, Display) else ""
     of = " of 1 - g" if is_glossy(problem.target) else ""
     return [
-        f"{sides[0]} to {sides[1]}, for {problem.low:g} to {problem.high:g}.",
+        f"{sides[0]} to {sides[1]}, for {number_text(problem.low)} to {number_text(problem.high)}.",
         f"Least squares under the {metric.name} metric{exposure}: keeps the {metric.keeps}.",
         f"Worst relative error{of} {formula.error:.2g} in float32; {formula.shape.operations} "
         "operations (+ - * count 1; / sqrt 1/sqrt count 4).",
@@ -209,7 +210,9 @@ def latex(formula: Formula, problem: Problem) -> str:
         value = rf"\frac{{{value}}}{{{down}}}"
     elif shape.factor and len(formula.numerator) > 1:
         value = rf"\left({value}\right)"
-    if shape.factor:
+    if shape.factor and len(formula.numerator) == 1 and not formula.denominator:
+        value = f"{value} {_latex_power(base, shape.factor)}"
+    elif shape.factor:
         value = f"{_latex_power(base, shape.factor)} {value}"
     if shape.outer != 1:
         value = rf"\left({value}\right)^{{{_exponent(shape.outer)}}}"

@@ -203,20 +203,26 @@ def _minimax(u: Array, wanted: Array, shape: Shape, bound: float) -> Array | Non
     powers = u[:, None] ** np.arange(max(shape.numerator, shape.denominator + 1))
     up = powers[:, : shape.numerator] / wanted[:, None]
     columns = np.concatenate([up, -powers[:, 1 : shape.denominator + 1]], axis=1)
+    if not np.isfinite(columns).all():
+        return None
     weight: Array = np.full(u.size, 1 / u.size)
     down: Array = np.ones(u.size)
     best, smallest = None, np.inf
     for step in range(_REWEIGHTINGS):
         root = np.sqrt(weight) / down
+        if not np.isfinite(root).all():
+            break
         found = np.linalg.lstsq(columns * root[:, None], root, rcond=None)[0]
         down = horner((1.0, *found[shape.numerator :].tolist()), u)
         error = np.abs((columns @ found - 1) / down)
-        if not (down > 0).all():
+        if not ((down > 0).all() and np.isfinite(error).all()):
             break
         if np.max(error) < smallest:
             best, smallest = found, np.max(error)
         mean = np.sqrt(weight @ error**2)
         if mean > bound and (step >= _SETTLED or not shape.denominator):
             return None
+        if not weight @ error > 0:
+            break
         weight = weight * error / (weight @ error)
     return best

@@ -131,7 +131,7 @@ def test_the_comment_states_what_was_promised(found):
     problem, formula, _ = found
     code = write_formula(formula, problem, "c")
     assert code.isascii()
-    assert f"for {problem.low:g} to {problem.high:g}" in code
+    assert f"for {problem.low:.10g} to {problem.high:.10g}" in code
     assert f"the {problem.metric.name} metric" in code
     assert f"{formula.error:.2g} in float32" in code
     assert f"{formula.shape.operations} operations" in code
@@ -179,6 +179,16 @@ def test_coefficients_are_nearly_minimax():
     bounds = np.concatenate([np.ones(w.size), -np.ones(w.size)])
     least = linprog([0, 0, 0, 1], limits, bounds, bounds=[(None, None)] * 4).fun
     assert least * 0.999 <= formula.error <= least * 1.05
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "low", "high"),
+    [("ggx", "blinn-phong", 0.01, 0.1), ("smoothie", "beckmann", 0.001, 0.01)],
+)
+def test_nearly_exact_shapes_do_not_break_the_search(source, target, low, high):
+    problem = Problem(endpoint(source), endpoint(target), metric("unit"), low, high)
+    front = pareto_front(problem)
+    assert front[-1].error < 1e-6
 
 
 def test_tolerances_that_cannot_be_met_say_what_can():

@@ -34,6 +34,9 @@ class Brdf(StrEnum):
 
     ashikhmin_shirley = "ashikhmin-shirley"
     cook_torrance = "cook-torrance"
+    smoothie = "smoothie"
+    smoothie_approx = "smoothie-approx"
+    modified_phong = "modified-phong"
 
 
 def command(
@@ -60,7 +63,10 @@ def command(
     ] = None,
     exposure: Annotated[
         float,
-        typer.Option(metavar="E", help="Exposure: 1 displays the peak of Beckmann as white."),
+        typer.Option(
+            metavar="E",
+            help="Exposure: 1 displays the peak of Beckmann, or its brightest channel, as white.",
+        ),
     ] = 1.0,
     light: Annotated[Light, typer.Option(help="A directional light or a square one.")] = (
         Light.directional
@@ -68,6 +74,14 @@ def command(
     brdf: Annotated[
         Brdf, typer.Option(help="The BRDF into which the distribution is put.")
     ] = Brdf.ashikhmin_shirley,
+    material: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="What is reflected: gold, silver, copper, nickel, iron or chrome, in colour; "
+            "acrylic, polycarbonate, polystyrene, polyethylene, polypropylene or pvc.",
+        ),
+    ] = None,
     normalized: Annotated[bool, typer.Option("--normalized/--unit", help="The form of D.")] = True,
     size: Annotated[int, typer.Option(metavar="N", help="Pixels a side of a picture.")] = 256,
     dpi: Annotated[int, typer.Option(metavar="N", help="Resolution of the sheet.")] = 120,
@@ -83,7 +97,14 @@ def command(
 
     Writes a contact sheet (fig4.png, fig5.png) and the luminance through the highlight (CSV).
     Prints RMSE and PSNR against Beckmann, in linear light and as displayed, and the ratios of
-    peak and total energy.
+    peak and total energy; of a metal over all three channels, and the luminance is that of its
+    colour. Without --material F is Schlick's for a grey dielectric of index 1.5. A distant light
+    meets the whole sphere with one F, but for modified-phong, which takes it at the viewer's
+    angle: there and under an area light plastics differ, metals everywhere.
+
+    The distribution goes into the Smoothie article's exact form (smoothie, D F/(h.h)), its
+    approximate one (smoothie-approx, half angle by the length of h in the surface, no G), or
+    around the mirror direction (modified-phong, which is Phong's for blinn-phong).
 
     Examples:
 
@@ -92,7 +113,10 @@ def command(
     mdfconv compare --m-b 0.2 --mdf ggx --light area --exposure 4
 
     mdfconv compare --m-b 0.1 --method fit --metric display --brdf cook-torrance --size 512
+
+    mdfconv compare --m-b 0.3 --material gold --brdf smoothie
     """
+    from mdfconv.brdf.materials import material as find_material
     from mdfconv.reports.comparison import PAPER_FIGURES, Scene, compare
     from mdfconv.reports.comparison_figure import draw_comparison
     from mdfconv.reports.error_curves import DRAWN
@@ -102,8 +126,9 @@ def command(
         raise MdfconvError("--dpi is from 1 to 2400")
     rules = _rules(method, metric, exposure)
     names = one_parameter_names(mdf or DRAWN)
+    made_of = find_material(material).name if material else None
     folder = check_folder(output)
-    scene = Scene(brdf.value, light.value, normalized, exposure, size)
+    scene = Scene(brdf.value, light.value, normalized, exposure, size, made_of)
     figures = {f"compare-m_b-{value:g}": value for value in m_b or ()}
     rows: list[dict[str, Any]] = []
     contents: dict[str, bytes] = {}

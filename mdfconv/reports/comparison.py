@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from mdfconv.brdf.fresnel import schlick_fresnel
+from mdfconv.brdf.materials import Fresnel, material
 from mdfconv.conversion import convert
 from mdfconv.conversion.residual import lobe_reach
 from mdfconv.distributions import distribution
@@ -19,6 +21,7 @@ from mdfconv.reports.sphere import Frame, cross_section, lights, microfacet, rad
 from mdfconv.reports.text import rounded_rows
 
 _SECTION_POINTS = 401
+_REC_709 = np.array([0.2126, 0.7152, 0.0722])  # luminance of linear R, G, B (ITU-R BT.709)
 # Sawicki 2021, captions of Figures 4 and 5: the surfaces of Figures 1 and 2.
 PAPER_FIGURES = {"fig4": 0.4, "fig5": 0.04464}
 
@@ -30,7 +33,7 @@ class Scene:
     Parameters
     ----------
     brdf : str
-        ``"ashikhmin-shirley"`` or ``"cook-torrance"``.
+        A name in `mdfconv.brdf.reflection.BRDFS`.
     light : str
         ``"directional"`` or ``"area"``.
     normalized : bool
@@ -39,6 +42,8 @@ class Scene:
         Where the reference's peak is displayed: 1 is white.
     size : int
         Pixels a side.
+    material : str, optional
+        The material's name, a metal or a plastic; without one F is Schlick's with F₀ = 0.04.
     """
 
     brdf: str = "ashikhmin-shirley"
@@ -46,6 +51,12 @@ class Scene:
     normalized: bool = True
     exposure: float = 1.0
     size: int = 256
+    material: str | None = None
+
+    @property
+    def fresnel(self) -> Fresnel:
+        """F of a cosine."""
+        return material(self.material).fresnel if self.material else schlick_fresnel
 
 
 @dataclass(frozen=True)
@@ -90,10 +101,10 @@ class Rendering:
         The distribution.
     parameter : float
         Its parameter.
-    image : numpy.ndarray, shape (size, size)
-        Linear light, relative to the reference's peak.
+    image : numpy.ndarray, shape (size, size), or (3, size, size) in colour
+        Linear light, relative to the reference's peak, in colour that of its brightest channel.
     section : numpy.ndarray, shape (n,)
-        The same along the line through the highlight.
+        Luminance along the line through the highlight, relative to the reference's peak.
     """
 
     name: str
@@ -194,30 +205,48 @@ def compare(
     }
     reach = float(lobe_reach(distribution("beckmann"), np.asarray(parameter)))
     position, normals = cross_section(_SECTION_POINTS, min(reach, 1.0))
-    reference = _render("beckmann", parameter, scene, normals, 1.0)
+    reference = _render("beckmann", parameter, scene, normals)
     if reference.image.max() < 0.5 * reference.section.max():
         raise MdfconvError(
             f"the highlight of beckmann m_B = {parameter:g} falls between the pixels: raise --size"
         )
     # The pixel at the highlight need not hit the peak; the section's is as good a unit.
-    unit = float(max(reference.image.max(), reference.section.max()))
+    peak = max(reference.image.max(), reference.section.max())
+    pixels = reference.image.reshape(*reference.image.shape[:-2], -1)
+    unit = max(_luminance(pixels).max(), _luminance(reference.section).max())
+
+    def relative(entry: Rendering) -> Rendering:
+        section = _luminance(entry.section) / unit
+        return replace(entry, image=entry.image / peak, section=section)
+
     return Comparison(
         scene,
-        Rendering("beckmann", parameter, reference.image / unit, reference.section / unit),
+        relative(reference),
         {
-            label: [_render(name, value, scene, normals, unit) for name, value in pairs]
+            label: [relative(_render(name, value, scene, normals)) for name, value in pairs]
             for label, pairs in converted.items()
         },
         position,
     )
 
 
-def _render(name: str, parameter: float, scene: Scene, normals: Array, unit: float) -> Rendering:
-    surface = microfacet(distribution(name), parameter, scene.brdf, normalized=scene.normalized)
+def _render(name: str, parameter: float, scene: Scene, normals: Array) -> Rendering:
+    """Return the picture and the section, both in colour and not yet relative to a peak."""
+    surface = microfacet(
+        distribution(name),
+        parameter,
+        scene.brdf,
+        normalized=scene.normalized,
+        fresnel=scene.fresnel,
+    )
     light = lights(scene.light)
     image = Frame(scene.size).render(surface, light)
-    section = radiance(normals, surface, light)
-    return Rendering(name, parameter, image / unit, section / unit)
+    return Rendering(name, parameter, image, radiance(normals, surface, light))
+
+
+def _luminance(light: Array) -> Array:
+    """Return the luminance of light of shape (n,), or (3, n) in colour."""
+    return light if light.ndim == 1 else np.tensordot(_REC_709, light, 1)
 
 
 def _rmse(one: Array, other: Array) -> float:

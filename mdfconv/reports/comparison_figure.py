@@ -40,13 +40,16 @@ def draw_comparison(found: Comparison, dpi: int = 120) -> bytes:
     figure = plt.figure(figsize=(width, height + _PLOT + 0.6))
     top, bottom = figure.subfigures(2, 1, height_ratios=(height, _PLOT))
     scene = found.scene
+    surface = f"{scene.brdf}, {scene.material}" if scene.material else scene.brdf
+    colored = found.reference.image.ndim == 3
+    white = f"1: the peak of Beckmann is {'as bright as its colour can be' if colored else 'white'}"
     figure.suptitle(
-        f"Beckmann m_B = {found.reference.parameter:.4g} and its substitutes: {scene.brdf},\n"
+        f"Beckmann m_B = {found.reference.parameter:.4g} and its substitutes: {surface},\n"
         f"{scene.light} light, {'normalized' if scene.normalized else 'unit form'} D, exposure "
-        f"{scene.exposure:g} (1: the peak of Beckmann is white)",
+        f"{scene.exposure:g} ({white})",
         fontsize=10,
     )
-    coverage = Frame(scene.size).normals()[1].reshape(found.reference.image.shape)
+    coverage = Frame(scene.size).normals()[1].reshape(scene.size, scene.size)
     panels = top.subplots(len(rows), columns, squeeze=False)
     for line, (rule, renderings) in zip(panels, rows, strict=True):
         for axes in line:
@@ -72,6 +75,8 @@ def draw_comparison(found: Comparison, dpi: int = 120) -> bytes:
 
 def _picture(axes: Any, found: Comparison, coverage: Array, entry: Rendering, label: str) -> None:
     shown = srgb(found.scene.exposure * entry.image + (1 - coverage) * _BACKGROUND)
+    # Matplotlib has the channels last; a grey picture has none.
+    shown = np.moveaxis(shown, 0, -1) if shown.ndim == 3 else shown
     axes.imshow(shown, cmap="gray", vmin=0, vmax=1, interpolation="antialiased")
     axes.set_title(label, fontsize=7.5, pad=3)
 

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mdfconv.brdf.reflection import BRDFS
+from mdfconv.brdf.fresnel import schlick_fresnel
+from mdfconv.brdf.materials import Fresnel
+from mdfconv.brdf.reflection import BRDFS, Geometry
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
-from mdfconv.errors import MdfconvError
+from mdfconv.errors import MdfconvError, unknown_name
 
 VIEW = np.array([0.0, 0.0, 1.0])
 LIGHT = np.array([-0.5, 0.5, np.sqrt(0.5)])  # 45° off the viewer, from above left
@@ -22,7 +24,8 @@ _AREA_HALF_SIDE = 0.15  # of the distance to the square light
 _AREA_SAMPLES = 8  # a side
 _MARGIN = 1.04  # half the picture, in radii
 
-# Reflectance for normals (n, 3), one direction of light and one of the viewer, 1/sr.
+# Reflectance for normals (n, 3), one direction of light and one of the viewer, 1/sr: shape (n,),
+# or (3, n) in colour.
 Reflectance = Callable[[Array, Array, Array], Array]
 
 
@@ -61,7 +64,12 @@ def lights(kind: str) -> Lights:
 
 
 def microfacet(
-    distribution: Distribution, parameter: float, brdf: str, *, normalized: bool
+    distribution: Distribution,
+    parameter: float,
+    brdf: str,
+    *,
+    normalized: bool,
+    fresnel: Fresnel = schlick_fresnel,
 ) -> Reflectance:
     """Return the reflectance of a BRDF with a distribution put in.
 
@@ -70,21 +78,24 @@ def microfacet(
     distribution, parameter
         The distribution and its parameter.
     brdf : str
-        ``"ashikhmin-shirley"`` or ``"cook-torrance"``.
+        A name in `BRDFS`.
     normalized : bool
         Which form of D.
+    fresnel : callable
+        F of a cosine; by default Schlick's for a grey dielectric of index 1.5.
+
+    Raises
+    ------
+    MdfconvError
+        If the BRDF is unknown.
     """
     if brdf not in BRDFS:
-        raise MdfconvError(f"unknown BRDF '{brdf}'; known: {', '.join(BRDFS)}")
-    density = distribution.normalized if normalized else distribution.unit
+        raise unknown_name("BRDF", brdf, list(BRDFS))
+    form = distribution.normalized if normalized else distribution.unit
 
     def reflectance(normals: Array, light: Array, view: Array) -> Array:
-        half = (light + view) / np.linalg.norm(light + view)
-        # The angle between unit vectors by the chord: arccos loses its digits near 0.
-        chord = np.linalg.norm(normals - half, axis=1)
-        angle = 2 * np.arcsin(np.minimum(0.5 * chord, 1))
-        cosines = normals @ light, normals @ view, normals @ half
-        return BRDFS[brdf](density(angle, parameter), *cosines, float(half @ light))
+        geometry = Geometry(normals, light, view)
+        return BRDFS[brdf](lambda angle: form(angle, parameter), fresnel, geometry)
 
     return reflectance
 
@@ -103,15 +114,18 @@ def radiance(normals: Array, reflectance: Reflectance, light: Lights) -> Array:
 
     Returns
     -------
-    numpy.ndarray, shape (n,)
+    numpy.ndarray, shape (n,), or (3, n) in colour
         Radiance in units of irradiance per steradian.
     """
-    total = np.zeros(len(normals))
+    total: Array = np.zeros(len(normals))
     seen = normals @ VIEW > 0
     for direction, irradiance in zip(light.directions, light.irradiance, strict=True):
         cosine = normals @ direction
         lit = np.flatnonzero(seen & (cosine > 0))
-        total[lit] += reflectance(normals[lit], direction, VIEW) * cosine[lit] * irradiance
+        sent = reflectance(normals[lit], direction, VIEW) * cosine[lit] * irradiance
+        everywhere = np.zeros((*sent.shape[:-1], len(normals)))
+        everywhere[..., lit] = sent
+        total = total + everywhere
     return total
 
 
@@ -141,12 +155,16 @@ class Frame:
         return np.stack([x, y, z], axis=-1).reshape(-1, 3), coverage.ravel()
 
     def render(self, reflectance: Reflectance, light: Lights) -> Array:
-        """Return the picture in linear light, shape (size, size), black around the sphere."""
+        """Return the picture in linear light, black around the sphere.
+
+        Its shape is (size, size), or (3, size, size) in colour.
+        """
         normals, coverage = self.normals()
-        picture = np.zeros(len(normals))
         inside = np.flatnonzero(coverage)
-        picture[inside] = radiance(normals[inside], reflectance, light) * coverage[inside]
-        return picture.reshape(self.size, self.size)
+        sent = radiance(normals[inside], reflectance, light) * coverage[inside]
+        picture = np.zeros((*sent.shape[:-1], len(normals)))
+        picture[..., inside] = sent
+        return picture.reshape(*sent.shape[:-1], self.size, self.size)
 
 
 def cross_section(count: int, width: float) -> tuple[Array, Array]:

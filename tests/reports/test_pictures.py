@@ -50,7 +50,17 @@ def test_curves_follow_the_lobe():
     assert rough.values["ggx"].max() == 1
 
 
-@pytest.mark.parametrize("brdf", ["ashikhmin-shirley", "cook-torrance"])
+# f at n = h, by D F and the cosine c of half vector and light.
+HEIGHTS = {
+    "ashikhmin-shirley": lambda c: 1 / (4 * c * c),
+    "cook-torrance": lambda c: 1 / (4 * c * c),
+    "smoothie": lambda c: 1 / (4 * c * c),
+    "smoothie-approx": lambda c: 1 / 4,
+    "modified-phong": lambda c: 1,
+}
+
+
+@pytest.mark.parametrize("brdf", HEIGHTS)
 @pytest.mark.parametrize("name", NAMES)
 def test_highlight_has_the_analytic_place_and_height(name, brdf):
     parameter = 200.0 if name in ("blinn-phong", "sawicki") else 0.1
@@ -60,12 +70,13 @@ def test_highlight_has_the_analytic_place_and_height(name, brdf):
     light = lights("directional")
     section = radiance(normals, surface, light)
     place = int(np.argmax(section))
-    assert position[place] == pytest.approx(np.hypot(*highlight()), abs=2e-3)
+    # Where no masking divides it out, the cosine at the surface draws the peak to the light.
+    assert position[place] == pytest.approx(np.hypot(*highlight()), abs=4e-3)
     half = (LIGHT + VIEW) / np.linalg.norm(LIGHT + VIEW)
     cosine = half @ LIGHT
     fresnel = 0.04 + 0.96 * (1 - cosine) ** 5
     # At n = h: f (n·l) with n·l = n·v = h·l, and no masking; the light brings π.
-    peak = np.pi * entry.normalized(0, parameter) * fresnel / (4 * cosine)
+    peak = np.pi * entry.normalized(0, parameter) * fresnel * HEIGHTS[brdf](cosine) * cosine
     assert radiance(half[None, :], surface, light)[0] == pytest.approx(peak, rel=1e-12)
     assert section.max() == pytest.approx(peak, rel=2e-3)
     picture = Frame(256).render(surface, light)
@@ -183,6 +194,55 @@ def test_compare(tmp_path):
     assert (folder / "compare-m_b-0.2.png").exists()
 
 
+def test_a_distant_light_shows_a_metal_in_one_color():
+    """One half vector for the whole picture: each channel is the grey picture, scaled by F."""
+    rules = default_rules(1.0)[1:2]
+    grey = compare(0.3, rules, Scene(size=48), ["ggx"])
+    gold = compare(0.3, rules, Scene(size=48, material="gold"), ["ggx"])
+    assert gold.reference.image.shape == (3, 48, 48)
+    cosine = np.cos(np.pi / 8)  # the light is 45° off the viewer
+    color = np.array([1.0, 0.766, 0.336])
+    color = color + (1 - color) * (1 - cosine) ** 5
+    for found, plain in (
+        (gold.reference, grey.reference),
+        (gold.rows["fit energy (light)"][0], grey.rows["fit energy (light)"][0]),
+    ):
+        expected = (color / color.max())[:, None, None] * plain.image
+        np.testing.assert_allclose(found.image, expected, rtol=1e-12)
+        np.testing.assert_allclose(found.section, plain.section, rtol=1e-12)
+    (row,), (plain_row,) = gold.table(), grey.table()
+    share = np.sqrt(np.mean(np.square(color / color.max())))
+    assert row["rmse_linear"] == pytest.approx(share * plain_row["rmse_linear"], rel=1e-12)
+    assert row["energy_ratio"] == pytest.approx(plain_row["energy_ratio"], rel=1e-12)
+
+
+def test_fresnel_shows_where_it_takes_the_viewers_angle():
+    """Modified Phong has F(n·v), which brightens the rim of a plastic and hardly that of silver."""
+    rims = {}
+    for name in ("acrylic", "silver"):
+        scene = Scene("modified-phong", size=64, material=name)
+        found = compare(0.4, default_rules(1.0)[:1], scene, ["ggx"])
+        rims[name] = np.interp(0.85, found.position, found.reference.section)
+    assert rims["acrylic"] > 1.2 * rims["silver"] > 0
+
+
+def test_compare_a_material(tmp_path):
+    status, out, _ = run(
+        "compare", "--m-b", 0.2, "--mdf", "smoothie", "--material", "Copper", "--brdf",
+        "smoothie-approx", "--method", "half-angle", "--size", 64, "--output", tmp_path,
+        "--format", "json",
+    )  # fmt: skip
+    assert status == 0
+    (record,) = json.loads(out)
+    assert record["distribution"] == "smoothie"
+    with Image.open(tmp_path / "compare-m_b-0.2.png") as picture:
+        pixels = np.asarray(picture.convert("RGB")).astype(int)
+    # Copper is red; the sheet around it, and a grey material, are not.
+    assert (pixels[..., 0] - pixels[..., 2]).max() > 40
+    section = list(csv.DictReader((tmp_path / "compare-m_b-0.2.csv").read_text().splitlines()))
+    assert max(float(row["beckmann"]) for row in section) == pytest.approx(1, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -202,6 +262,8 @@ def test_compare(tmp_path):
         (("compare", "--light", "sun"), "'sun' is not one of"),
         (("compare", "--mdf", "gx"), "did you mean ggx"),
         (("compare", "--method", "wart"), "did you mean ward"),
+        (("compare", "--material", "golt"), "did you mean gold"),
+        (("compare", "--brdf", "phong"), "'phong' is not one of"),
     ],
 )
 def test_bad_requests_write_nothing(tmp_path, arguments, words):

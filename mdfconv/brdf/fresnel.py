@@ -1,0 +1,136 @@
+"""Fresnel reflectance: exact for dielectrics and conductors, and the usual approximations.
+
+Every function takes cosines of the angle of incidence in [0, 1], of any shape, and returns the
+unpolarized reflectance in the same shape, float64.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+
+NORMAL_REFLECTANCE = 0.04  # a dielectric of index 1.5
+# The constants that the article on Smoothie prints.
+SMOOTHIE_FIT = (-1.71983, -5.43926)
+
+
+def dielectric(cosine: ArrayLike, ior: float) -> Array:
+    """Return the exact reflectance of a dielectric (Fresnel 1823; Born & Wolf, 1.5.2).
+
+    Parameters
+    ----------
+    cosine : array_like
+        Cosine of the angle of incidence, [0, 1].
+    ior : float
+        Relative index of refraction, far side over near side; below 1 from the inside, with
+        total internal reflection beyond the critical angle.
+
+    Returns
+    -------
+    numpy.ndarray
+        ½ (r_s² + r_p²), in [0, 1]. Next to the critical angle, where the slope is infinite,
+        it is exact for a cosine within rounding of the given one.
+
+    Raises
+    ------
+    MdfconvError
+        If the index is not a positive finite number.
+    """
+    return _unpolarized(cosine, complex(check_index(ior)))
+
+
+def conductor(cosine: ArrayLike, eta: float, k: float) -> Array:
+    """Return the exact reflectance of a conductor (Born & Wolf, 14.2).
+
+    Parameters
+    ----------
+    cosine : array_like
+        Cosine of the angle of incidence, [0, 1].
+    eta, k : float
+        Relative index of refraction and extinction coefficient, m = η + ik. With k = 0 it is
+        a dielectric.
+
+    Returns
+    -------
+    numpy.ndarray
+        ½ (|r_s|² + |r_p|²), in [0, 1].
+
+    Raises
+    ------
+    MdfconvError
+        If η is not positive or k is negative.
+    """
+    if not (np.isfinite(k) and k >= 0):
+        raise MdfconvError(f"the extinction coefficient is at least 0, not {k:g}")
+    return _unpolarized(cosine, complex(check_index(eta), k))
+
+
+def check_index(ior: float) -> float:
+    """Return an index of refraction; raise `MdfconvError` unless positive and finite."""
+    if not (np.isfinite(ior) and ior > 0):
+        raise MdfconvError(f"an index of refraction is a positive number, not {ior:g}")
+    return float(ior)
+
+
+def _unpolarized(cosine: ArrayLike, index: complex) -> Array:
+    """Return ½ (|r_s|² + |r_p|²) for m = `index`.
+
+    With z = √(m² − 1 + c²) the usual r_s = (c − z)/(c + z) and r_p = (m²c − z)/(m²c + z) become,
+    expanded by their denominators, −(m²−1)/(c+z)² and (m²−1) ((m²+1)c² − 1)/(m²c+z)²: sums of
+    what does not cancel for m near 1. Total internal reflection is an imaginary z.
+    """
+    c = np.asarray(cosine, float)
+    contrast = (index - 1) * (index + 1)
+    if contrast == 0:
+        return np.zeros_like(c)
+    square = index * index
+    z = np.sqrt(contrast + c * c)
+    perpendicular = contrast / np.square(c + z)
+    parallel = contrast * ((square + 1) * (c * c) - 1) / np.square(square * c + z)
+    reflected = 0.5 * (np.abs(perpendicular) ** 2 + np.abs(parallel) ** 2)
+    # Rounding may miss the whole, next to the critical angle, or exceed it.
+    return np.where(z.real == 0, 1, np.minimum(reflected, 1))
+
+
+def normal_reflectance(ior: float) -> float:
+    """Return F₀ = ((n₁−n₂)/(n₁+n₂))², the reflectance along the normal.
+
+    Parameters
+    ----------
+    ior : float
+        Relative index of refraction n₂/n₁; its reciprocal has the same F₀.
+
+    Raises
+    ------
+    MdfconvError
+        If the index is not a positive finite number.
+    """
+    return ((check_index(ior) - 1) / (ior + 1)) ** 2
+
+
+def schlick_fresnel(
+    cosine: Array | float, normal_reflectance: Array | float = NORMAL_REFLECTANCE
+) -> Array | float:
+    """Return Schlick's approximation F₀ + (1−F₀) (1−cos)⁵ (Schlick 1994, equation 15)."""
+    return normal_reflectance + (1 - normal_reflectance) * (1 - cosine) ** 5
+
+
+def smoothie_fresnel(
+    cosine: ArrayLike, a: float = SMOOTHIE_FIT[0], b: float = SMOOTHIE_FIT[1]
+) -> Array:
+    """Return exp2(a + b (l·h)), h = l + v not normalized (Smoothie: an empirical BRDF).
+
+    Like Schlick's (1−cos)⁵ it leads from the reflectance along the normal, F₀, to 1: the
+    reflectance is F₀ + (1−F₀) times it. It is at most 2^a.
+
+    Parameters
+    ----------
+    cosine : array_like
+        l·H for the normalized half vector H, [0, 1]; l·h = 2 (l·H)².
+    a, b : float
+        The constants; by default the printed ones.
+    """
+    return np.exp2(a + 2 * b * np.square(np.asarray(cosine, float)))

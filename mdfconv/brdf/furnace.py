@@ -1,0 +1,222 @@
+"""The white furnace: how much of the light that comes from everywhere alike is reflected.
+
+The directional albedo ∫ f(l, v) cos θ_l dω_l of a surface that absorbs nothing is 1. It is
+integrated by quadrature on panels that end where the integrand has its kinks (the horizon) and
+shrink towards its peak (the mirror image, or the half vector along the normal).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from mdfconv.brdf.directions import direction, dot, reflect
+from mdfconv.distributions.evaluation import Array
+
+Reflection: TypeAlias = Callable[[Array, Array], Array]
+Sampler: TypeAlias = Callable[[Array, Array, Array], tuple[Array, Array]]
+
+_ORDER = 12
+_GROWTH = 2.5
+# Of the width of a peak: where the panels around it begin.
+_FIRST_PANEL = 0.02
+_LEAST_PANEL = 1e-8
+# Nearer to grazing rounding shows, and the limit is within 1e-6 from here on.
+_LEAST_COSINE = 1e-8
+_CHUNK = 4
+
+
+@dataclass(frozen=True)
+class FurnaceModel:
+    """A BRDF with what the integration must know of it.
+
+    Parameters
+    ----------
+    reflection : callable
+        f(light, view), 1/sr, for unit vectors of shape (..., 3).
+    width : float
+        About the angle, in radians, over which f falls from its peak.
+    around_mirror : bool
+        Whether the peak surrounds the mirror image of the viewer (Phong) or, in half vectors,
+        the normal (microfacets).
+    sample : callable
+        From (view, u₁, u₂) to light directions and their density, 1/sr.
+    """
+
+    reflection: Reflection
+    width: float
+    around_mirror: bool
+    sample: Sampler
+
+
+def directional_albedo(model: FurnaceModel, cosine: Array) -> Array:
+    """Integrate f cos θ_l over the hemisphere, to about 1e-9.
+
+    Parameters
+    ----------
+    model : FurnaceModel
+        The BRDF.
+    cosine : numpy.ndarray, shape (n,)
+        Cosines of the viewer with the normal, 0 < cos θ ≤ 1; at 0 the limit is approached.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        The share of the light that is reflected.
+    """
+    integrate = _around_mirror if model.around_mirror else _around_normal
+    clipped = np.clip(cosine, _LEAST_COSINE, 1)
+    return np.array([integrate(model, float(value)) for value in clipped])
+
+
+def sampled_albedo(
+    model: FurnaceModel, cosine: Array, count: int, seed: int
+) -> tuple[Array, Array]:
+    """Estimate the directional albedo by drawing light directions.
+
+    Parameters
+    ----------
+    model : FurnaceModel
+        The BRDF.
+    cosine : numpy.ndarray, shape (n,)
+        Cosines of the viewer.
+    count : int
+        Directions for each, at least 2.
+    seed : int
+        Of the random numbers.
+
+    Returns
+    -------
+    albedo, standard_error : numpy.ndarray, shape (n,)
+        Means of f cos θ_l / p, and their standard errors.
+    """
+    random = np.random.default_rng(seed)
+    results = [_estimate(model, float(value), random.random((2, count))) for value in cosine]
+    albedo, error = np.array(results).reshape(-1, 2).T
+    return albedo, error
+
+
+def _estimate(model: FurnaceModel, cosine: float, numbers: Array) -> tuple[float, float]:
+    view = np.broadcast_to(_viewer(max(cosine, _LEAST_COSINE)), (*numbers[0].shape, 3))
+    light, density = model.sample(view, *numbers)
+    value = model.reflection(light, view) * light[..., 2]
+    weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
+    return float(weight.mean()), float(weight.std(ddof=1) / np.sqrt(weight.size))
+
+
+def _viewer(cosine: float) -> Array:
+    return np.array([np.sqrt((1 - cosine) * (1 + cosine)), 0.0, cosine])
+
+
+def _around_normal(model: FurnaceModel, cosine: float) -> float:
+    """Integrate over half vectors m = (t cos φ, t sin φ, 1)/√(1+t²), dω_l = 4 (v·m) dω_m.
+
+    The light is above the horizon for t < t_h(φ), the positive root of c t² − 2 s cos φ t − c.
+    """
+    sine = np.sqrt((1 - cosine) * (1 + cosine))
+    phi, phi_weight = _azimuths(cosine)
+    along = sine * np.cos(phi)
+    root = np.hypot(along, cosine)
+    # The root without the difference of two nearly equal numbers.
+    horizon = np.where(along > 0, (along + root) / cosine, cosine / (root + np.abs(along)))
+    kinks = _kinks(along, cosine)
+    total = 0.0
+    view = _viewer(cosine)
+    for rows in np.array_split(np.arange(phi.size), max(1, phi.size // _CHUNK)):
+        t, weight = _from_zero(horizon[rows], kinks[rows], model.width)
+        theta = np.arctan(t)
+        m = direction(theta, phi[rows, None])
+        light = reflect(np.broadcast_to(view, m.shape), m)
+        jacobian = 4 * dot(m, view) * np.sin(theta) * np.square(np.cos(theta))
+        value = model.reflection(light, np.broadcast_to(view, m.shape)) * light[..., 2]
+        total += float(phi_weight[rows] @ np.sum(value * jacobian * weight, axis=1))
+    # The two halves of the circle are alike.
+    return 2 * total
+
+
+def _azimuths(cosine: float) -> tuple[Array, Array]:
+    """Return φ on [0, π] and weights; at grazing the horizon turns within cos θ around π/2."""
+    steps = _growing(min(cosine, 1.0) * 0.2, np.pi / 2)
+    edges = np.concatenate([np.pi / 2 - steps[::-1], np.pi / 2 + steps[1:]])
+    return _gauss(edges)
+
+
+def _kinks(along: Array, cosine: float) -> Array:
+    """Return the t where light and viewer are level, and where V-cavities begin to mask either.
+
+    n·l = n·v at t = s cos φ/c, 2 (n·m)(n·v) = v·m at t = c/(s cos φ), and 2 (n·m)(n·l) = v·m
+    where tan 3θ_m = −c/(s cos φ); shape (n, 3).
+    """
+    slope = np.where(np.abs(along) > 0, along, 1e-300) / cosine
+    third = np.tan((np.pi - np.arctan2(1, slope)) / 3)
+    with np.errstate(over="ignore"):
+        return np.abs(np.stack([slope, 1 / slope, third], axis=1))
+
+
+def _from_zero(end: Array, kinks: Array, width: float) -> tuple[Array, Array]:
+    """Return nodes and weights on [0, end] for each row, dense around 0 on the scale of a width.
+
+    Panels end at the kinks, too.
+    """
+    largest = float(np.max(end))
+    edges = _growing(min(_FIRST_PANEL * width, largest), largest)
+    every = np.concatenate([np.broadcast_to(edges, (end.size, edges.size)), kinks], axis=1)
+    rows = np.sort(np.minimum(every, end[:, None]), axis=1)
+    x, w = np.polynomial.legendre.leggauss(_ORDER)
+    half = 0.5 * np.diff(rows, axis=1)[:, :, None]
+    nodes = rows[:, :-1, None] + half * (1 + x)
+    return nodes.reshape(end.size, -1), (half * w).reshape(end.size, -1)
+
+
+def _growing(first: float, end: float) -> Array:
+    """Return 0, then points that grow by a factor from the first to the end."""
+    count = max(1, int(np.ceil(np.log(end / first) / np.log(_GROWTH))))
+    return np.concatenate([[0.0], np.geomspace(first, end, count + 1)])
+
+
+def _gauss(edges: Array) -> tuple[Array, Array]:
+    x, w = np.polynomial.legendre.leggauss(_ORDER)
+    half = 0.5 * np.diff(edges)[:, None]
+    return (edges[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
+
+
+def _around_mirror(model: FurnaceModel, cosine: float) -> float:
+    """Integrate over directions at θ_r from the mirror image, in rings cut by the horizon.
+
+    With φ from the azimuth of the mirror image upwards, cos θ_l = c cos θ_r + s sin θ_r cos φ.
+    """
+    sine = np.sqrt((1 - cosine) * (1 + cosine))
+    grazing = np.arctan2(cosine, sine)  # from the mirror image down to the horizon
+    theta, theta_weight = _rings(grazing, model.width)
+    ratio = cosine * np.cos(theta) / np.maximum(sine * np.sin(theta), 1e-300)
+    # Rings beyond the horizon reach up to this azimuth from the highest point.
+    reach = np.arccos(np.clip(-ratio, -1, 1))
+    x, w = np.polynomial.legendre.leggauss(4 * _ORDER)
+    phi = 0.5 * reach[:, None] * (1 + x)
+    weight = 0.5 * reach[:, None] * w
+    view = _viewer(cosine)
+    mirrored = np.array([-view[0], 0.0, view[2]])
+    up, side = np.array([view[2], 0.0, view[0]]), np.array([0.0, 1.0, 0.0])
+    ring = np.cos(phi)[..., None] * up + np.sin(phi)[..., None] * side
+    light = np.cos(theta)[:, None, None] * mirrored + np.sin(theta)[:, None, None] * ring
+    value = model.reflection(light, np.broadcast_to(view, light.shape)) * light[..., 2]
+    rings = np.sum(value * weight, axis=1) * np.sin(theta)
+    return float(2 * theta_weight @ rings)
+
+
+def _rings(grazing: float, width: float) -> tuple[Array, Array]:
+    """Return θ_r on [0, π/2] and weights, dense at 0, at π/2 and around the horizon.
+
+    At π/2 a lobe with a broken exponent ends like a root.
+    """
+    end = np.pi / 2
+    lobe = _growing(min(_FIRST_PANEL * width, end), end)
+    root = _growing(_LEAST_PANEL, end)
+    near = np.concatenate(
+        [grazing - lobe, grazing + lobe, grazing - root, grazing + root, end - root]
+    )
+    edges = np.unique(np.concatenate([lobe, near[(near > 0) & (near < end)]]))
+    return _gauss(edges)

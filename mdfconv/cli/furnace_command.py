@@ -1,0 +1,127 @@
+"""``mdfconv furnace``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mdfconv.cli.output import FileOption, FormOption, write_records
+from mdfconv.errors import MdfconvError
+
+if TYPE_CHECKING:
+    from mdfconv.brdf.furnace import FurnaceModel
+    from mdfconv.distributions.evaluation import Array
+
+_MOST_POINTS = 10_001
+
+
+def command(
+    parameter: Annotated[
+        float,
+        typer.Argument(metavar="PARAMETER", help="Exponent of the Phong BRDFs, α of the others."),
+    ],
+    brdf: Annotated[
+        str,
+        typer.Option(
+            metavar="BRDF",
+            help="phong, modified-phong, ggx, beckmann, smoothie, smoothie-approx or "
+            "ashikhmin-shirley.",
+        ),
+    ] = "ggx",
+    normalizer: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Of modified-phong: usual (the default), arvo (integer exponents) or "
+            "mallett-yuksel.",
+        ),
+    ] = None,
+    masking: Annotated[
+        str | None,
+        typer.Option(
+            "--g",
+            metavar="G",
+            help="Of ggx and beckmann: correlated (the default), separable, v-cavity, ksk or none.",
+        ),
+    ] = None,
+    points: Annotated[
+        int, typer.Option(metavar="N", help="Cosines of the viewer, from 0 to 1.")
+    ] = 21,
+    samples: Annotated[
+        int | None,
+        typer.Option("--mc", metavar="N", help="Estimate by N random directions a cosine, too."),
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="S", help="Of the random numbers.")] = 0,
+    speed: Annotated[
+        bool,
+        typer.Option("--speed", help="Print speed against error of modified Phong's normalizers."),
+    ] = False,
+    png: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw the albedo over the cosine.")
+    ] = None,
+    format_: FormOption = None,
+    output: FileOption = None,
+) -> None:
+    """Put a BRDF that absorbs nothing into a white furnace: how much light comes back.
+
+    Prints the directional albedo, which is 1 if no energy is lost or made, over the cosine of
+    the viewer with the normal; the Fresnel term is 1. By quadrature, with --mc also by sampling.
+
+    Examples:
+
+    mdfconv furnace --brdf ggx 0.5
+
+    mdfconv furnace --brdf modified-phong --normalizer arvo 100 --format csv
+
+    mdfconv furnace --brdf beckmann --g v-cavity 0.3 --mc 10000 --png furnace.png
+
+    mdfconv furnace --brdf modified-phong --speed 100
+    """
+    import numpy as np
+
+    from mdfconv.brdf.models import furnace_model
+
+    if speed:
+        if brdf != "modified-phong" or normalizer or samples or png:
+            raise MdfconvError("--speed compares the normalizers of --brdf modified-phong")
+        _write_speed(parameter, format_, output)
+        return
+    if not 2 <= points <= _MOST_POINTS:
+        raise MdfconvError(f"--points is from 2 to {_MOST_POINTS}")
+    if samples is not None and samples < 2:
+        raise MdfconvError("--mc needs 2 samples or more")
+    model = furnace_model(brdf, parameter, normalizer=normalizer, masking=masking)
+    rows = _rows(model, np.linspace(0, 1, points), samples, seed)
+    title = f"White furnace: {brdf} {parameter:g}"
+    if png:
+        from mdfconv.reports.furnace_figure import draw_albedo
+        from mdfconv.reports.text import write_files
+
+        curve = {title.removeprefix("White furnace: "): [row["albedo"] for row in rows]}
+        cosines = [row["cos_theta"] for row in rows]
+        write_files({png: draw_albedo(cosines, {"": curve})})
+        typer.echo(f"mdfconv: wrote {png}", err=True)
+    write_records(list(rows[0]), rows, format_, output, title)
+
+
+def _rows(
+    model: FurnaceModel, cosine: Array, samples: int | None, seed: int
+) -> list[dict[str, Any]]:
+    from mdfconv.brdf.furnace import directional_albedo, sampled_albedo
+    from mdfconv.reports.text import rounded_rows
+
+    columns = {"cos_theta": cosine, "albedo": directional_albedo(model, cosine)}
+    if samples:
+        columns["sampled"], columns["standard_error"] = sampled_albedo(model, cosine, samples, seed)
+    return rounded_rows(columns)
+
+
+def _write_speed(exponent: float, form: Any, output: Path | None) -> None:
+    from mdfconv.benchmark.normalizers import normalizer_speeds
+
+    rows = normalizer_speeds(exponent)
+    write_records(
+        list(rows[0]), rows, form, output, f"Normalizers of modified Phong, γ = {exponent:g}"
+    )

@@ -1,0 +1,105 @@
+"""Materials by name, and the BRDFs of `compare` against their sources' own expressions."""
+
+import numpy as np
+import pytest
+
+import mdfconv
+from mdfconv.brdf.materials import METALS, PLASTICS, list_materials, material
+from mdfconv.brdf.reflection import BRDFS, Geometry
+from mdfconv.errors import MdfconvError
+
+LIGHT = np.array([-0.6, 0.3, np.sqrt(1 - 0.45)])
+VIEW = np.array([0.2, -0.1, np.sqrt(1 - 0.05)])
+
+
+def lit_normals(count=400):
+    """Return normals that see both light and viewer."""
+    normals = np.random.default_rng(7).normal(size=(count, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals[(normals @ LIGHT > 0) & (normals @ VIEW > 0)]
+
+
+def evaluate(brdf, name, parameter, fresnel=lambda cosine: 1.0):
+    normals = lit_normals()
+    entry = mdfconv.distribution(name)
+    found = BRDFS[brdf](
+        lambda angle: entry.normalized(angle, parameter), fresnel, Geometry(normals, LIGHT, VIEW)
+    )
+    return normals, found
+
+
+def test_metals_start_at_their_color_and_end_at_white():
+    for name, color in METALS.items():
+        fresnel = material(name).fresnel
+        np.testing.assert_allclose(fresnel(1.0), np.array(color)[:, None])
+        np.testing.assert_allclose(fresnel(0.0), 1)
+        assert np.shape(fresnel(np.linspace(0, 1, 5))) == (3, 5)
+
+
+def test_plastics_reflect_as_their_index_says():
+    for name, ior in PLASTICS.items():
+        fresnel = material(name).fresnel
+        assert float(fresnel(1.0)) == pytest.approx(((ior - 1) / (ior + 1)) ** 2)
+        assert np.shape(fresnel(np.linspace(0, 1, 5))) == (5,)
+
+
+def test_names():
+    assert material(" Gold ").name == "gold"
+    assert {"gold", "chrome", "acrylic", "pvc"} <= set(list_materials())
+    with pytest.raises(MdfconvError, match="did you mean gold"):
+        material("golt")
+    with pytest.raises(MdfconvError, match="named by a string"):
+        material(3)
+
+
+@pytest.mark.parametrize("alpha", [0.01, 0.3, 1.0])
+def test_smoothie_is_the_articles(alpha):
+    """The article's expressions, whose D lacks the constant (α²+4)/π."""
+    h = LIGHT + VIEW
+    normals, found = evaluate("smoothie", "smoothie", alpha)
+    cosine = normals @ (h / np.linalg.norm(h))
+    article = (alpha + 4 * (1 - cosine**2) / alpha) ** -2 / (h @ h)
+    np.testing.assert_allclose(found, article * (alpha**2 + 4) / np.pi, rtol=1e-10)
+    normals, found = evaluate("smoothie-approx", "smoothie", alpha)
+    across = h - normals * (normals @ h)[:, None]
+    article = (alpha + np.square(across).sum(axis=1) / alpha) ** -2
+    np.testing.assert_allclose(found, article * (alpha**2 + 4) / (4 * np.pi), rtol=1e-10)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 20.0, 3000.0])
+def test_modified_phong_is_phongs(exponent):
+    normals, found = evaluate("modified-phong", "blinn-phong", exponent)
+    mirrored = 2 * (normals @ VIEW)[:, None] * normals - VIEW
+    lobe = np.maximum(mirrored @ LIGHT, 0) ** exponent * (exponent + 2) / (2 * np.pi)
+    assert np.count_nonzero(lobe == 0) > 10
+    np.testing.assert_allclose(found, lobe, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "parameter"), [("beckmann", 0.3), ("ggx", 0.4), ("gauss", 0.2)])
+def test_any_distribution_around_the_mirror_direction_reflects_all_energy(name, parameter):
+    """To a viewer along the normal: quadrature over directions of light."""
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    theta = 0.25 * np.pi * (nodes + 1)
+    normal = np.array([[0.0, 0.0, 1.0]])
+    entry = mdfconv.distribution(name)
+    total = 0.0
+    for angle, weight in zip(theta, weights, strict=True):
+        light = np.array([np.sin(angle), 0, np.cos(angle)])
+        value = BRDFS["modified-phong"](
+            lambda beta: entry.normalized(beta, parameter),
+            lambda cosine: 1.0,
+            Geometry(normal, light, normal[0]),
+        )
+        total += 0.25 * np.pi * weight * 2 * np.pi * value[0] * np.cos(angle) * np.sin(angle)
+    assert total == pytest.approx(1, rel=1e-9)
+
+
+@pytest.mark.parametrize("brdf", BRDFS)
+def test_a_metal_scales_the_channels(brdf):
+    _, grey = evaluate(brdf, "ggx", 0.3)
+    normals, colored = evaluate(brdf, "ggx", 0.3, material("copper").fresnel)
+    half = (LIGHT + VIEW) / np.linalg.norm(LIGHT + VIEW)
+    cosine = normals @ VIEW if brdf == "modified-phong" else half @ LIGHT
+    for channel, least in zip(colored, METALS["copper"], strict=True):
+        expected = grey * (least + (1 - least) * (1 - cosine) ** 5)
+        np.testing.assert_allclose(channel, expected, rtol=1e-12)

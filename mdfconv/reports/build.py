@@ -18,6 +18,9 @@ from mdfconv.reports.comparison import compare as compare_pictures
 from mdfconv.reports.comparison_figure import draw_comparison
 from mdfconv.reports.error_curves import PAPER_SETS, curves
 from mdfconv.reports.error_figure import draw_errors
+from mdfconv.reports.fresnel_page import fresnel_page
+from mdfconv.reports.furnace_page import furnace_page
+from mdfconv.reports.importer_page import importer_page
 from mdfconv.reports.method_page import method_page
 from mdfconv.reports.stability_page import stability_page
 from mdfconv.reports.table2 import COLUMNS, compare, fit_table, paper_sweep
@@ -237,6 +240,26 @@ def methods() -> Artefact:
     return Artefact(files, question, summary, "mdfconv report")
 
 
+def importers() -> Artefact:
+    """Return what importers make of a Wavefront exponent, beside the best fit."""
+    files, summary = importer_page()
+    question = "what becomes of Ns in a renderer with roughness"
+    return Artefact(files, question, summary, "mdfconv mtl --compare")
+
+
+def furnace() -> Artefact:
+    """Return the white furnace of the BRDFs."""
+    files, summary = furnace_page()
+    question = "the lecture's claim on normalizers; who loses energy, and who makes some"
+    return Artefact(files, question, summary, "mdfconv furnace")
+
+
+def fresnel() -> Artefact:
+    """Return Smoothie's Fresnel term beside the exact curves."""
+    files, summary = fresnel_page()
+    return Artefact(files, "Smoothie, the fit of the Fresnel term", summary, "mdfconv fresnel")
+
+
 def stability() -> Artefact:
     """Return the audit of hard cases."""
     files, summary = stability_page()
@@ -253,6 +276,9 @@ _ARTEFACTS: tuple[Callable[[], Artefact], ...] = (
     error_figures,
     pictures,
     methods,
+    importers,
+    furnace,
+    fresnel,
     stability,
 )
 COUNT = len(_ARTEFACTS)

@@ -1,0 +1,121 @@
+"""``mdfconv texture``."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mdfconv.cli.folder import check_folder
+from mdfconv.cli.output import progress
+
+
+class Depth(StrEnum):
+    """Bits of the result."""
+
+    keep = "keep"
+    eight = "8"
+    sixteen = "16"
+
+
+def command(
+    source_file: Annotated[
+        Path, typer.Argument(metavar="IN", help="Texture: PNG, TIFF or OpenEXR.")
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="OUT", help="File to write; not IN.")
+    ],
+    source: Annotated[
+        str,
+        typer.Option(
+            "--from",
+            metavar="MDF:ENCODING",
+            help="What the texels are: ggx:alpha, ggx:roughness, ggx:glossiness, likewise "
+            "beckmann; blinn-phong:exponent (N / --exponent-max), blinn-phong:log2 (N = 2^(k v)).",
+        ),
+    ],
+    target: Annotated[
+        str, typer.Option("--to", metavar="MDF:ENCODING", help="What they become, as for --from.")
+    ],
+    channel: Annotated[
+        str | None,
+        typer.Option(
+            metavar="C",
+            help="r, g, b, a or l (grey), in OpenEXR its name; needed if there are several.",
+        ),
+    ] = None,
+    method: Annotated[
+        str, typer.Option(metavar="METHOD", help="As for convert, but fast by default.")
+    ] = "fast",
+    metric: Annotated[
+        str,
+        typer.Option(metavar="METRIC", help="What fast and fit keep: unit, energy or display."),
+    ] = "unit",
+    exposure: Annotated[
+        float, typer.Option(metavar="E", help="Exposure for the display metric.")
+    ] = 1.0,
+    exponent_max: Annotated[
+        float, typer.Option(metavar="N", help="Exponent of the brightest texel, for exponent.")
+    ] = 1000.0,
+    log2_scale: Annotated[
+        float, typer.Option(metavar="K", help="k of log2; 13 is for exponents up to 8192.")
+    ] = 13.0,
+    depth: Annotated[Depth, typer.Option(help="Bits of the result.")] = Depth.keep,
+    dither: Annotated[
+        bool, typer.Option("--dither", help="Diffuse the errors of rounding to 8 bits.")
+    ] = False,
+    lossy: Annotated[
+        bool, typer.Option("--lossy", help="Take a JPEG, although it has altered the values.")
+    ] = False,
+    max_pixels: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Largest picture to decode; default Pillow's limit."),
+    ] = None,
+    png: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw histograms before and after.")
+    ] = None,
+) -> None:
+    """Convert a roughness texture, texel by texel.
+
+    Other channels, ICC profile and resolution are kept. Says on standard error how many texels
+    had no answer and took the nearest: a black texel of an exponent is the roughest surface, one
+    of an alpha or a roughness a perfect mirror.
+
+    Examples:
+
+    mdfconv texture gloss.png -o rough.png --from blinn-phong:exponent --to ggx:roughness
+
+    mdfconv texture rough.tif -o gloss.tif --from ggx:roughness --to beckmann:glossiness
+
+    mdfconv texture orm.png -o new.png --channel g --from ggx:roughness --to ggx:alpha --depth 16
+    """
+    from mdfconv.reports.text import write_files
+    from mdfconv.scene.image_files import check_place
+    from mdfconv.scene.texture import convert_texture_file
+    from mdfconv.scene.texture_rule import TextureRule
+
+    if png:
+        check_place(png, source_file, output)
+        check_folder(png.parent)
+    rule = TextureRule(source, target, method, metric, exposure, exponent_max, log2_scale)
+    report = convert_texture_file(
+        source_file,
+        output,
+        rule,
+        channel=channel,
+        depth=None if depth is Depth.keep else int(depth),
+        dither=dither,
+        lossy=lossy,
+        max_pixels=max_pixels,
+        progress=progress,
+    )
+    for note in report.notes():
+        typer.echo(f"mdfconv: note: {note}", err=True)
+    typer.echo(f"mdfconv: wrote {output}", err=True)
+    if png:
+        from mdfconv.scene.texture_figure import draw_histograms
+
+        write_files({png: draw_histograms(report, f"{source_file.name} → {output.name}")})
+        typer.echo(f"mdfconv: wrote {png}", err=True)

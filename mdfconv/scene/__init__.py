@@ -1,0 +1,14 @@
+"""Scene files: material libraries and roughness textures."""
+
+from mdfconv.scene.mtl import convert_mtl
+from mdfconv.scene.texture import convert_texture, convert_texture_file
+from mdfconv.scene.texture_map import TextureReport
+from mdfconv.scene.texture_rule import TextureRule
+
+__all__ = [
+    "TextureReport",
+    "TextureRule",
+    "convert_mtl",
+    "convert_texture",
+    "convert_texture_file",
+]

@@ -1,0 +1,293 @@
+"""Wavefront material libraries: roughness from exponents and back, every other byte kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.metrics import metric as find_metric
+from mdfconv.scene.mtl_statements import Line, lines, number, split_options
+from mdfconv.scene.shininess import error_of, exponent_of, roughness_of
+
+_LARGEST_USUAL = 1e4
+# Digits enough that an exponent comes back from a roughness to six.
+_DIGITS = {b"Pr": 8, b"Ns": 6}
+
+
+class To(StrEnum):
+    """What a library is converted to."""
+
+    roughness = "roughness"
+    shininess = "shininess"
+
+
+@dataclass(frozen=True)
+class Material:
+    """One conversion of a material.
+
+    Parameters
+    ----------
+    name : str
+        From its ``newmtl``; "" for statements before the first.
+    line : int
+        Line of the statement that was converted, counted from 1.
+    shininess, roughness : float
+        Ns and Pr: the one given and the one found.
+    rmse : float
+        The error that the conversion leaves: root mean square under the metric, relative to the
+        peak of Blinn/Phong.
+    notes : tuple of str
+        What a careful user must know.
+    """
+
+    name: str
+    line: int
+    shininess: float
+    roughness: float
+    rmse: float
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class TextureStatement:
+    """A ``map_Ns`` or ``map_Pr`` in a library.
+
+    Parameters
+    ----------
+    material, keyword, file : str
+        The material's name, the keyword and the file that it names.
+    line : int
+        Its line, counted from 1.
+    """
+
+    material: str
+    keyword: str
+    file: str
+    line: int
+
+
+@dataclass(frozen=True)
+class MtlConversion:
+    """A converted library.
+
+    Parameters
+    ----------
+    data : bytes
+        Its bytes.
+    materials : tuple of Material
+        What was converted, in the order of the library.
+    textures : tuple of TextureStatement
+        The textures of exponents (or of roughness, towards shininess) that it names.
+    problems : tuple of (int, str)
+        Statements left as they are: their lines and what is wrong with them.
+    """
+
+    data: bytes
+    materials: tuple[Material, ...]
+    textures: tuple[TextureStatement, ...]
+    problems: tuple[tuple[int, str], ...]
+
+
+@dataclass
+class _Block:
+    """What is known of one material while its library is converted."""
+
+    name: str
+    sources: list[Line] = field(default_factory=list)
+    targets: list[Line] = field(default_factory=list)
+    value: float | None = None
+
+
+def convert_mtl(
+    data: bytes,
+    to: str = To.roughness,
+    *,
+    metric: str | Metric = "energy",
+    replace: bool = False,
+    texture_names: dict[str, str] | None = None,
+) -> MtlConversion:
+    """Convert the shininess of a material library to roughness, or back.
+
+    Parameters
+    ----------
+    data : bytes
+        The library. Whatever is not converted is kept: comments, order, blanks, line ends.
+    to : str
+        ``"roughness"``: each material with an Ns gets the Pr of the GGX (α = Pr²) that fits
+        best. ``"shininess"``: each with a Pr gets the Ns whose best GGX that is.
+    metric : str or Metric
+        What the fit keeps; readers of Pr use normalized distributions, so by default the
+        light. ``"display"`` is at exposure 1.
+    replace : bool
+        Drop the statement that was converted.
+    texture_names : dict, optional
+        From files that ``map_Ns`` names to those that a ``map_Pr`` beside it is to name; for
+        shininess the other way round.
+
+    Returns
+    -------
+    MtlConversion
+        The library and what there is to say about it.
+
+    Raises
+    ------
+    MdfconvError
+        If `to` or the metric is not known.
+    """
+    if to not in list(To):
+        raise MdfconvError(f"a library is converted to roughness or shininess, not to '{to}'")
+    keywords = (b"Ns", b"Pr") if to == To.roughness else (b"Pr", b"Ns")
+    content = list(lines(data))
+    blocks, problems = _blocks(content, keywords)
+    materials = _converted(blocks, to, find_metric(metric))
+    texts = _edited(content, blocks, materials, keywords, replace=replace)
+    textures = _textures(content, blocks, b"map_" + keywords[0])
+    names = texture_names or {}
+    _set_textures(texts, content, textures, b"map_" + keywords[1], names, replace=replace)
+    return MtlConversion(
+        b"".join(texts), tuple(entry for entry in materials if entry), textures, tuple(problems)
+    )
+
+
+def texture_statements(data: bytes) -> tuple[TextureStatement, ...]:
+    """Return the textures of exponents, ``map_Ns``, that a library names."""
+    content = list(lines(data))
+    blocks, _ = _blocks(content, (b"Ns", b"Pr"))
+    return _textures(content, blocks, b"map_Ns")
+
+
+def _blocks(
+    lines: list[Line], keywords: tuple[bytes, bytes]
+) -> tuple[list[_Block], list[tuple[int, str]]]:
+    """Return the materials, before the first ``newmtl`` one without a name, and problems."""
+    blocks, problems = [_Block("")], []
+    for line in lines:
+        if line.keyword == b"newmtl":
+            blocks.append(_Block(line.value.decode(errors="replace")))
+        block = blocks[line.material]
+        if line.keyword == keywords[1]:
+            block.targets.append(line)
+        elif line.keyword == keywords[0]:
+            problem, value = number(line.value, keywords[0])
+            if problem:
+                problems.append((line.number, problem))
+            else:
+                # Of several statements readers take the last.
+                block.sources.append(line)
+                block.value = value
+    return blocks, problems
+
+
+def _converted(blocks: list[_Block], to: str, metric: Metric) -> list[Material | None]:
+    """Return the conversion of each material; None where there is nothing to convert."""
+    values = np.array([np.nan if block.value is None else block.value for block in blocks])
+    found, rmse = np.full((2, values.size), np.nan)
+    given = ~np.isnan(values) & ((values > 0) | (to == To.roughness))
+    unique, place = np.unique(values[given], return_inverse=True)
+    if to == To.roughness:
+        answer = roughness_of(unique, metric)
+        left = error_of(unique, answer, metric)
+    else:
+        answer = exponent_of(unique, metric)
+        left = error_of(answer, unique, metric)
+    found[given], rmse[given] = answer[place], left[place]
+    return [
+        None if np.isnan(value) else _material(block, to, float(value), float(result), float(error))
+        for block, value, result, error in zip(blocks, values, found, rmse, strict=True)
+    ]
+
+
+def _material(block: _Block, to: str, value: float, result: float, error: float) -> Material:
+    pair = (value, result) if to == To.roughness else (result, value)
+    notes = []
+    if pair[0] == 0:
+        notes.append("Ns 0 is no highlight: Pr 1")
+    if pair[0] > _LARGEST_USUAL:
+        notes.append("Ns beyond 10000")
+    if pair[1] == 0:
+        notes.append("Pr 0 is a mirror, which has no exponent: nothing written")
+    if len(block.sources) > 1:
+        notes.append(f"{len(block.sources)} statements: the last counts")
+    return Material(block.name, block.sources[-1].number, *pair, error, tuple(notes))
+
+
+def _edited(
+    lines: list[Line],
+    blocks: list[_Block],
+    materials: list[Material | None],
+    keywords: tuple[bytes, bytes],
+    *,
+    replace: bool,
+) -> list[bytes]:
+    """Return the lines, ends included, with the targets set; a dropped line is empty."""
+    texts = [line.content + line.end for line in lines]
+    default_end = next((line.end for line in lines if line.end), b"\n")
+    for block, material in zip(blocks, materials, strict=True):
+        result = None if material is None else _result(material, keywords[1])
+        if result is None:
+            continue
+        last = block.sources[-1]
+        for line in block.targets:
+            texts[line.number - 1] = line.with_value(keywords[1], result) + line.end
+        if replace:
+            for line in block.sources:
+                texts[line.number - 1] = b""
+        if not block.targets:
+            new = last.with_value(keywords[1], result)
+            if not replace:
+                new = last.content + (last.end or default_end) + last.another(keywords[1], result)
+            texts[last.number - 1] = new + last.end
+    return texts
+
+
+def _result(material: Material, keyword: bytes) -> bytes | None:
+    """Return the number to write; None if there is none."""
+    value = material.roughness if keyword == b"Pr" else material.shininess
+    return None if np.isnan(value) else f"{value:.{_DIGITS[keyword]}g}".encode()
+
+
+def _textures(
+    lines: list[Line], blocks: list[_Block], keyword: bytes
+) -> tuple[TextureStatement, ...]:
+    return tuple(
+        TextureStatement(
+            blocks[line.material].name,
+            keyword.decode(),
+            split_options(line.value)[1].decode(errors="surrogateescape"),
+            line.number,
+        )
+        for line in lines
+        if line.keyword == keyword and line.value
+    )
+
+
+def _set_textures(
+    texts: list[bytes],
+    lines: list[Line],
+    textures: tuple[TextureStatement, ...],
+    keyword: bytes,
+    names: dict[str, str],
+    *,
+    replace: bool,
+) -> None:
+    """Name the converted textures, in a line of their own or in the place of the others."""
+    default_end = next((line.end for line in lines if line.end), b"\n")
+    targets = {line.material: line for line in lines if line.keyword == keyword}
+    for texture in textures:
+        line = lines[texture.line - 1]
+        if texture.file not in names:
+            continue
+        options, _ = split_options(line.value)
+        value = options + names[texture.file].encode(errors="surrogateescape")
+        target = targets.get(line.material)
+        if target:
+            texts[target.number - 1] = target.with_value(keyword, value) + target.end
+        if replace:
+            texts[line.number - 1] = b"" if target else line.with_value(keyword, value) + line.end
+        elif not target:
+            new = (b"" if line.end else default_end) + line.another(keyword, value) + line.end
+            texts[line.number - 1] += new

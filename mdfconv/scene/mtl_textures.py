@@ -1,0 +1,63 @@
+"""Exponent textures of a material library: converted to roughness beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from mdfconv.errors import MdfconvError
+from mdfconv.scene.mtl import TextureStatement
+from mdfconv.scene.texture import convert_texture_file
+from mdfconv.scene.texture_rule import TextureRule
+
+
+def convert_textures(
+    textures: Sequence[TextureStatement],
+    library: Path,
+    output: Path,
+    metric: str,
+    exponent_max: float,
+    advance: Callable[[int], None],
+) -> tuple[dict[str, str], list[tuple[int, str]]]:
+    """Convert the textures that a library names, into the folder of its conversion.
+
+    Parameters
+    ----------
+    textures : sequence of TextureStatement
+        The ``map_Ns`` statements.
+    library, output : Path
+        The library, which the files are named relative to, and its conversion.
+    metric : str
+        What the fit keeps.
+    exponent_max : float
+        Exponent of a white texel.
+    advance : callable
+        Called with 1 after each statement.
+
+    Returns
+    -------
+    names : dict
+        From the files named to the new ones: ``wood.png`` becomes ``wood_Pr.png``.
+    problems : list of (int, str)
+        For each texture that cannot be converted its line and the reason.
+    """
+    rule = TextureRule(
+        "blinn-phong:exponent", "ggx:roughness", metric=metric, exponent_max=exponent_max
+    )
+    rule.endpoints()
+    names: dict[str, str] = {}
+    problems = []
+    for texture in textures:
+        # Libraries from Windows separate folders by backslashes.
+        source = library.parent / texture.file.replace("\\", "/")
+        target = output.parent / f"{source.stem}_Pr{source.suffix}"
+        try:
+            if texture.file not in names:
+                if target.exists():
+                    raise MdfconvError(f"will not write {target}: it exists")
+                convert_texture_file(source, target, rule)
+                names[texture.file] = target.name
+        except MdfconvError as error:
+            problems.append((texture.line, str(error)))
+        advance(1)
+    return names, problems

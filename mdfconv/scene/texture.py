@@ -1,0 +1,166 @@
+"""Roughness textures: every texel converted, as arrays and as files."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mdfconv.errors import MdfconvError, MdfconvWarning
+from mdfconv.scene.image_files import blank, check_files, open_picture, staged
+from mdfconv.scene.image_picture import Picture
+from mdfconv.scene.texture_map import BLOCK, TexelMap, TextureReport
+from mdfconv.scene.texture_rule import TextureRule
+from mdfconv.scene.texture_values import ValueConverter
+
+Progress: TypeAlias = Callable[[str, int], AbstractContextManager[Callable[[int], None]]]
+
+
+def convert_texture(
+    array: ArrayLike, rule: TextureRule, *, depth: int | None = None, dither: bool = False
+) -> NDArray[Any]:
+    """Convert the texels of an array.
+
+    Parameters
+    ----------
+    array : array_like of uint8, uint16, float16, float32 or float64, any shape
+        The one channel that holds the roughness. Integers stand for their share of the largest
+        integer.
+    rule : TextureRule
+        What to convert, and how.
+    depth : int, optional
+        8 or 16 for a result of so many bits, from integers; the type is kept if not given.
+    dither : bool
+        Whether a result of 8 bits hands its rounding errors to the neighbours; takes a
+        two-dimensional array.
+
+    Returns
+    -------
+    numpy.ndarray
+        The converted texels, same shape. Texels that have no answer are treated as
+        `mdfconv.scene.texture_values.ValueConverter` says; NaN stays NaN.
+
+    Raises
+    ------
+    MdfconvError
+        If a name is unknown, the pair not covered by the method, or the array not a texture.
+
+    Warns
+    -----
+    MdfconvWarning
+        Once, if texels were clamped or are NaN.
+
+    Examples
+    --------
+    >>> rule = TextureRule("blinn-phong:exponent", "ggx:roughness", metric="energy")
+    >>> convert_texture(np.array([0, 26, 255], np.uint8), rule)
+    array([255,  91,  52], dtype=uint8)
+    """
+    given = np.asarray(array)
+    if dither and given.ndim != 2:
+        raise MdfconvError(f"dither takes an array of rows and columns, not of shape {given.shape}")
+    texels = TexelMap(rule, given.dtype, depth, given.shape[1] if dither else None)
+    converted = np.empty(given.shape, texels.dtype)
+    rows, places = (side if dither else side.reshape(-1, 1) for side in (given, converted))
+    step = _rows_a_block(rows.shape[1])
+    for start in range(0, len(rows), step):
+        places[start : start + step] = texels(rows[start : start + step])
+    for note in texels.report().notes(ends=False)[:1]:
+        warnings.warn(note, MdfconvWarning, stacklevel=2)
+    return converted
+
+
+def convert_texture_file(
+    source: str | Path,
+    output: str | Path,
+    rule: TextureRule,
+    *,
+    channel: str | None = None,
+    depth: int | None = None,
+    dither: bool = False,
+    lossy: bool = False,
+    max_pixels: int | None = None,
+    progress: Progress | None = None,
+) -> TextureReport:
+    """Convert a texture in a PNG, TIFF or OpenEXR file, and write it to another.
+
+    The other channels, the ICC profile and the resolution are kept, bit by bit unless the depth
+    changes. Values are taken as they are stored: a profile is not applied.
+
+    Parameters
+    ----------
+    source, output : str or Path
+        The files; their names end in what they hold: .png, .tif, .tiff or .exr. EXR becomes
+        EXR, PNG and TIFF become either. An existing output is replaced, whole or not at all.
+    rule : TextureRule
+        What to convert, and how.
+    channel : str, optional
+        r, g, b, a or l (grey), in EXR the channel's name; needed if there is more than one.
+    depth : int, optional
+        8 or 16 bits for the result; kept if not given.
+    dither : bool
+        Whether a result of 8 bits hands its rounding errors to the neighbours.
+    lossy : bool
+        Whether to accept a source whose compression has altered its values, such as JPEG.
+    max_pixels : int, optional
+        The largest picture that is decoded; Pillow's limit if not given.
+    progress : callable, optional
+        ``progress(description, total)``, a context that yields what advances by so many rows.
+
+    Returns
+    -------
+    TextureReport
+        How many texels were clamped and why, and histograms before and after.
+
+    Raises
+    ------
+    MdfconvError
+        If the rule, the source or the output cannot be; nothing is then written.
+    """
+    source, output = Path(source), Path(output)
+    ValueConverter(rule)  # names are wrong more often than files
+    given_form, form = check_files(source, output, lossy=lossy)
+    with staged(output) as beside:
+        given = open_picture(source, given_form, channel, lossy=lossy, max_pixels=max_pixels)
+        texels = TexelMap(rule, given.dtype, depth, given.width if dither else None)
+        converted = given if texels.dtype == given.dtype else blank(given, texels.dtype)
+        with progress("rows", given.height) if progress else nullcontext(_ignore) as advance:
+            _convert(given, converted, texels, advance)
+        converted.save(beside, form)
+    return texels.report()
+
+
+def _convert(
+    given: Picture, converted: Picture, texels: TexelMap, advance: Callable[[int], None]
+) -> None:
+    """Convert row by row, into the same picture or into one of another depth."""
+    step = _rows_a_block(given.width)
+    for top in range(0, given.height, step):
+        block = given.read(top, min(top + step, given.height))
+        channel = texels(block[..., given.channel])
+        block = _rescaled(block, texels.dtype)
+        block[..., given.channel] = channel
+        converted.write(top, block)
+        advance(len(block))
+
+
+def _rescaled(block: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return the channels that are not converted in the depth of the result."""
+    if block.dtype == dtype:
+        return block
+    if dtype == np.uint16:
+        return block * np.uint16(257)
+    return np.rint(block / np.float32(257)).astype(np.uint8)
+
+
+def _rows_a_block(width: int) -> int:
+    return max(1, BLOCK // max(1, width))
+
+
+def _ignore(rows: int) -> None:
+    pass

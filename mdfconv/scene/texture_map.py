@@ -1,0 +1,195 @@
+"""A rule as a function on texels of one type, with a tally of what it did."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdfconv.errors import MdfconvError
+from mdfconv.scene.texture_dither import ErrorDiffusion
+from mdfconv.scene.texture_rule import TextureRule
+from mdfconv.scene.texture_values import Outcome, ValueConverter
+
+BLOCK = 1 << 19  # texels converted at a time
+BINS = 256
+DEPTHS = (8, 16)
+# Types of which every value fits into a table.
+_TABLED = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float16))
+_TYPES = (*_TABLED, np.dtype(np.float32), np.dtype(np.float64))
+
+
+def result_type(given: np.dtype[Any], depth: int | None, dither: bool) -> np.dtype[Any]:
+    """Return the type of the converted texels.
+
+    Parameters
+    ----------
+    given : numpy.dtype
+        That of the texture.
+    depth : int or None
+        Bits of an integer texel, 8 or 16; None keeps the type.
+    dither : bool
+        Whether the errors of rounding are to be diffused.
+
+    Raises
+    ------
+    MdfconvError
+        If it is no type of a texture, or cannot have the depth or be dithered.
+    """
+    native = given.newbyteorder("=")
+    if native not in _TYPES:
+        names = ", ".join(entry.name for entry in _TYPES)
+        raise MdfconvError(f"a texture is an array of {names}, not {given.name}")
+    if depth is not None:
+        if depth not in DEPTHS:
+            raise MdfconvError(f"the depth of a texture is 8 or 16 bits, not {depth}")
+        if native.kind == "f":
+            raise MdfconvError("a depth is for integers: a texture of floats keeps its type")
+        native = np.dtype(f"u{depth // 8}")
+    if dither and native != np.uint8:
+        raise MdfconvError(f"dither is for results of 8 bits, not for {native.name}")
+    return native
+
+
+@dataclass(frozen=True)
+class TextureReport:
+    """What a conversion did to a texture.
+
+    Parameters
+    ----------
+    source, target : str
+        Distribution and encoding.
+    texels : int
+        How many were converted.
+    outcomes : dict of Outcome to int
+        How many were answered, and how many were treated as `ValueConverter` says.
+    before, after : numpy.ndarray of int, shape (256,)
+        Histograms of the stored values from 0 to 1; without NaN.
+    """
+
+    source: str
+    target: str
+    texels: int
+    outcomes: dict[Outcome, int]
+    before: NDArray[np.int64]
+    after: NDArray[np.int64]
+
+    def notes(self, *, ends: bool = True) -> list[str]:
+        """Return what the user must know; `ends` includes mirrors and uniform lobes."""
+        texts = {
+            Outcome.MIRROR: f"perfect mirrors in {self.source}, and the smoothest {self.target}",
+            Outcome.UNIFORM: f"uniform lobes in {self.source}, and the roughest {self.target}",
+            Outcome.UNANSWERED: "without an answer by the method, clamped to the nearest",
+            Outcome.CLAMPED: f"clamped: their results are outside 0..1 in {self.target}",
+            Outcome.OUTSIDE: f"clamped: they are outside 0..1 in {self.source}",
+            Outcome.NAN: "NaN, and left so",
+        }
+        if not ends:
+            del texts[Outcome.MIRROR], texts[Outcome.UNIFORM]
+        return [
+            f"{self.outcomes[outcome]} of {self.texels} texels are {text}"
+            for outcome, text in texts.items()
+            if self.outcomes[outcome]
+        ]
+
+
+class TexelMap:
+    """A rule on texels of one type; integers and halves go through a table.
+
+    Parameters
+    ----------
+    rule : TextureRule
+        What to convert, and how.
+    given : numpy.dtype
+        Type of the texels.
+    depth : int or None
+        Bits of the result, 8 or 16; None keeps the type.
+    width : int or None
+        Texels a row, to diffuse the errors of rounding; None rounds each texel for itself.
+
+    Raises
+    ------
+    MdfconvError
+        If the rule or the type cannot be converted.
+    """
+
+    def __init__(
+        self, rule: TextureRule, given: np.dtype[Any], depth: int | None, width: int | None = None
+    ) -> None:
+        self.dtype = result_type(given, depth, width is not None)
+        self._given = given.newbyteorder("=")
+        self._convert = ValueConverter(rule)
+        self._dither = None if width is None else ErrorDiffusion(width)
+        self._outcomes = np.zeros(len(Outcome), np.int64)
+        self._before, self._after = (np.zeros(BINS, np.int64) for _ in range(2))
+        self._table = self._tabled() if self._given in _TABLED else None
+
+    def __call__(self, block: NDArray[Any]) -> NDArray[Any]:
+        """Convert some texels, any shape; with dither the next rows, shape (rows, width)."""
+        texels = block.astype(self._given, copy=False)
+        if self._table is None:
+            values, outcomes = self._convert(texels.astype(np.float64))
+            converted: NDArray[Any] = values.astype(self.dtype)
+            self._outcomes += np.bincount(outcomes.ravel(), minlength=len(Outcome))
+            self._before += _histogram(texels)
+        else:
+            key = texels.view(f"u{self._given.itemsize}")
+            self._counts += np.bincount(key.ravel(), minlength=self._counts.size)
+            converted = self._table[key]
+            if self._dither:
+                converted = self._dither(converted)
+        self._after += _histogram(converted)
+        return converted
+
+    def report(self) -> TextureReport:
+        """Return what was done so far."""
+        outcomes, before = self._outcomes, self._before
+        if self._table is not None:
+            outcomes = np.zeros_like(self._outcomes)
+            np.add.at(outcomes, self._table_outcomes, self._counts)
+            before = self._histogram_of_counts()
+        return TextureReport(
+            *self._convert.labels,
+            texels=int(outcomes.sum()),
+            outcomes=dict(zip(Outcome, outcomes.tolist(), strict=True)),
+            before=before,
+            after=self._after.copy(),
+        )
+
+    def _tabled(self) -> NDArray[Any]:
+        """Return the answer for every value of the type, in levels if it is dithered."""
+        every = np.arange(1 << 8 * self._given.itemsize).astype(f"u{self._given.itemsize}")
+        self._counts = np.zeros(every.size, np.int64)
+        stored = every.view(self._given).astype(np.float64)
+        if self._given.kind == "u":
+            stored /= every[-1]
+        values, self._table_outcomes = self._convert(stored)
+        if self.dtype.kind == "f":
+            return values.astype(self.dtype)
+        levels = values * np.iinfo(self.dtype).max
+        return levels.astype(np.float32) if self._dither else np.rint(levels).astype(self.dtype)
+
+    def _histogram_of_counts(self) -> NDArray[np.int64]:
+        every = np.arange(self._counts.size).astype(f"u{self._given.itemsize}")
+        texels = every.view(self._given)
+        known = ~np.isnan(texels)
+        before = np.zeros(BINS, np.int64)
+        np.add.at(before, _bins(texels[known]), self._counts[known])
+        return before
+
+
+def _histogram(texels: NDArray[Any]) -> NDArray[np.int64]:
+    known = texels if texels.dtype.kind == "u" else texels[~np.isnan(texels)]
+    return np.bincount(_bins(known).ravel(), minlength=BINS)
+
+
+def _bins(texels: NDArray[Any]) -> NDArray[Any]:
+    """Return which of 256 bins from 0 to 1 each texel falls into."""
+    if texels.dtype == np.uint8:
+        return texels
+    if texels.dtype == np.uint16:
+        return texels >> 8
+    scaled = np.clip(texels, 0, 1) * (BINS - 1)
+    return np.rint(scaled).astype(np.uint8)

@@ -1,0 +1,301 @@
+"""Material libraries: bytes kept, numbers right, read by others, files safe."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tinyobjloader
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+import mdfconv
+from mdfconv.scene import convert_mtl
+from tests.cli.runner import run
+
+DATA = Path(__file__).parent / "data"
+LIBRARIES = [DATA / "lecture_brdfs.mtl", DATA / "lecture_metals.mtl"]
+
+
+def read(data, folder):
+    """Return what an independent reader sees: the fields of each material by name."""
+    (folder / "library.mtl").write_bytes(data)
+    triangle = "mtllib library.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    (folder / "scene.obj").write_text(triangle)
+    reader = tinyobjloader.ObjReader()
+    assert reader.ParseFromFile(str(folder / "scene.obj"))
+    return {
+        entry.name: {
+            field: getattr(entry, field)
+            for field in dir(entry)
+            if not field.startswith("_") and not callable(getattr(entry, field))
+        }
+        for entry in reader.GetMaterials()
+    }
+
+
+@pytest.mark.parametrize("library", LIBRARIES, ids=lambda path: path.stem)
+def test_another_reader_sees_the_roughness_and_nothing_else_changed(library, tmp_path):
+    data = library.read_bytes()
+    before = read(data, tmp_path)
+    after = read(convert_mtl(data).data, tmp_path)
+    assert after.keys() == before.keys()
+    for name, fields in after.items():
+        exponent = before[name]["shininess"]
+        # tinyobjloader has 1 where a library has no Ns.
+        if b"Ns" in block(data, name):
+            best = 1.0
+            if exponent:
+                best = mdfconv.convert(
+                    exponent, "blinn-phong", "ggx:roughness", "fit", metric="energy"
+                )
+            assert fields["roughness"] == pytest.approx(best, rel=1e-6)
+            del fields["roughness"], before[name]["roughness"]
+        assert fields == before[name]
+
+
+def block(data, name):
+    return next(part for part in data.split(b"newmtl ") if part.startswith(name.encode()))
+
+
+@pytest.mark.parametrize("metric", ["energy", "display"])
+@pytest.mark.parametrize("replace", [False, True])
+@pytest.mark.parametrize("library", LIBRARIES, ids=lambda path: path.stem)
+def test_libraries_come_back(library, replace, metric, tmp_path):
+    data = b"".join(
+        line
+        for line in library.read_bytes().splitlines(keepends=True)
+        if not line.startswith(b"Pr")
+    )
+    there = convert_mtl(data, metric=metric, replace=replace)
+    back = convert_mtl(there.data, "shininess", metric=metric, replace=True)
+    assert not there.problems
+    assert not back.problems
+    assert read(back.data, tmp_path) == read(data, tmp_path)
+    if replace:
+        assert back.data == data
+
+
+def test_the_answer_of_the_introduction():
+    (found,) = convert_mtl(b"newmtl a\nNs 100\n").materials
+    assert found.roughness == pytest.approx(0.36, abs=5e-4)
+    assert found.roughness**2 == pytest.approx(0.1296, abs=5e-5)
+
+
+SOURCE = (
+    b"\xef\xbb\xbf# caf\xe9\r\nnewmtl wood [oak]  \r\n\tNs   9.6078431e+01 # glossy\r\n\r\n"
+    b"  Kd 1 0 0\r\nrefl -type sphere x.png\r\nnewmtl b\nPr  0.5\t# old\nNs 10\nNs 20"
+)
+CONVERTED = (
+    b"\xef\xbb\xbf# caf\xe9\r\nnewmtl wood [oak]  \r\n\tNs   9.6078431e+01 # glossy\r\n"
+    b"\tPr   0.36352381\r\n\r\n"
+    b"  Kd 1 0 0\r\nrefl -type sphere x.png\r\nnewmtl b\nPr  0.52861212\t# old\nNs 10\nNs 20"
+)
+REPLACED = (
+    b"\xef\xbb\xbf# caf\xe9\r\nnewmtl wood [oak]  \r\n\tPr   0.36352381 # glossy\r\n\r\n"
+    b"  Kd 1 0 0\r\nrefl -type sphere x.png\r\nnewmtl b\nPr  0.52861212\t# old\n"
+)
+
+
+def test_every_other_byte_is_kept():
+    found = convert_mtl(SOURCE)
+    assert found.data == CONVERTED
+    assert [entry.name for entry in found.materials] == ["wood [oak]", "b"]
+    assert found.materials[1].notes == ("2 statements: the last counts",)
+    assert convert_mtl(SOURCE, replace=True).data == REPLACED
+    # Done once, it is done.
+    assert convert_mtl(found.data).data == found.data
+
+
+@pytest.mark.parametrize(
+    ("statement", "text"),
+    [
+        (b"Ns", "Ns '' is not a number"),
+        (b"Ns x", "Ns 'x' is not a number"),
+        (b"Ns 1 2", "Ns '1 2' is not a number"),
+        (b"Ns 0,5", "Ns '0,5' is not a number"),
+        (b"Ns nan", "Ns 'nan' is not a number"),
+        (b"Ns 1_000", "Ns '1_000' is not a number"),
+        (b"Ns 1e999", "Ns '1e999' is outside Ns ≥ 0"),
+        (b"Ns -1", "Ns '-1' is outside Ns ≥ 0"),
+        (b"Ns \xff", "Ns '\ufffd' is not a number"),
+    ],
+)
+def test_what_is_not_a_number_is_reported_and_left(statement, text):
+    data = b"newmtl a\n" + statement + b"\n"
+    found = convert_mtl(data)
+    assert found.data == data
+    assert found.problems == ((2, text),)
+    assert not found.materials
+
+
+def test_ends_of_the_range():
+    data = b"newmtl a\nNs 0\nnewmtl b\nNs 0.03\nnewmtl c\nNs 1e6\nnewmtl d\nNs .5e-9\n"
+    found = convert_mtl(data)
+    none, low, high, tiny = found.materials
+    assert (none.roughness, none.notes) == (1.0, ("Ns 0 is no highlight: Pr 1",))
+    assert 0.99 < low.roughness < 1
+    assert high.notes == ("Ns beyond 10000",)
+    assert tiny.roughness == 1.0
+    back = convert_mtl(b"newmtl a\nPr 0\nnewmtl b\nPr 1\nnewmtl c\nPr 1.5\n", "shininess")
+    assert back.data == b"newmtl a\nPr 0\nnewmtl b\nPr 1\nNs 0\nnewmtl c\nPr 1.5\n"
+    assert back.problems == ((6, "Pr '1.5' is outside 0 ≤ Pr ≤ 1"),)
+
+
+@settings(deadline=None)
+@given(st.floats(0.1, 1e6), st.sampled_from(["energy", "display", "unit"]))
+def test_exponents_come_back_to_six_digits(exponent, metric):
+    data = b"newmtl a\nNs %.6g\n" % exponent
+    there = convert_mtl(data, metric=metric, replace=True)
+    (back,) = convert_mtl(there.data, "shininess", metric=metric).materials
+    assert back.shininess == pytest.approx(float(f"{exponent:.6g}"), rel=1e-6)
+
+
+WORDS = st.sampled_from(
+    b"newmtl|Ns|Pr|map_Ns| |\t|\n|\r|\r\n|#|1|0.5|-1e3|x.png|-s|\\|\xff|\x00|\xef\xbb\xbf|Kd".split(
+        b"|"
+    )
+)
+SOUP = st.one_of(st.binary(max_size=200), st.lists(WORDS, max_size=60).map(b"".join))
+
+
+@settings(deadline=None)
+@given(SOUP, st.sampled_from(["roughness", "shininess"]), st.booleans())
+def test_byte_soup_keeps_its_bytes(data, to, replace):
+    found = convert_mtl(data, to, replace=replace)
+    changed = (b"Ns", b"Pr")
+    if not (found.materials or found.textures):
+        assert found.data == data
+    # What is left of both when the statements in question are taken out is the same.
+    assert untouched(found.data, changed) == untouched(data, changed)
+
+
+def untouched(data, keywords):
+    lines = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+    kept = [
+        line
+        for line in lines
+        if not line.removeprefix(b"\xef\xbb\xbf").strip(b" \t").startswith(keywords)
+    ]
+    # A new last line may need an end before it; an empty line is no statement.
+    return [line for line in kept if line.strip(b" \t\xef\xbb\xbf")]
+
+
+@settings(deadline=None)
+@given(SOUP)
+def test_without_a_statement_nothing_changes(data):
+    data = data.replace(b"Ns", b"Nx").replace(b"Pr", b"Px")
+    assert convert_mtl(data).data == data
+
+
+def test_a_long_line_takes_no_long_time():
+    data = b"newmtl a\nNs 1" + b" " * 200_000 + b"x\nmap_Ns " + b"-s 1 " * 20_000 + b"\n"
+    assert convert_mtl(data).data == data
+
+
+def test_command(tmp_path):
+    (tmp_path / "a.mtl").write_bytes(SOURCE)
+    status, out, err = run("mtl", "a.mtl", "-o", "b.mtl", cwd=tmp_path)
+    assert (status, out) == (0, "")
+    assert (tmp_path / "b.mtl").read_bytes() == CONVERTED
+    assert (tmp_path / "a.mtl").read_bytes() == SOURCE
+    assert "wood [oak]" in err
+    assert "0.363524" in err
+    status, out, _ = run(
+        "mtl", "a.mtl", "-o", "c.mtl", "--format", "json", "--compare", cwd=tmp_path
+    )
+    (record,) = json.loads(out)
+    assert [row["shininess"] for row in record["materials"]] == [96.078431, 20.0]
+    rules = record["materials"][0]["1 - Ns/1000"]
+    assert rules["roughness"] == pytest.approx(0.903921569)
+    assert rules["rmse"] > 5 * record["materials"][0]["rmse"]
+    assert record["materials"][0]["1 - sqrt(Ns)/10"]["roughness"] == pytest.approx(0.0198, abs=1e-4)
+
+
+def test_in_place_keeps_the_original(tmp_path):
+    for name in ("a.mtl", "b.mtl"):
+        (tmp_path / name).write_bytes(SOURCE)
+    (tmp_path / "a.mtl").chmod(0o640)
+    for _ in range(2):
+        status, _, _ = run("mtl", "--in-place", "*.mtl", cwd=tmp_path)
+        assert status == 0
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {f"{x}.mtl{end}" for x in "ab" for end in ("", ".bak", ".bak2")}
+    assert (tmp_path / "a.mtl").read_bytes() == CONVERTED
+    assert (tmp_path / "a.mtl.bak").read_bytes() == SOURCE
+    assert (tmp_path / "a.mtl").stat().st_mode & 0o777 == 0o640
+
+
+def test_a_bad_statement_turns_the_status_to_1(tmp_path):
+    (tmp_path / "a.mtl").write_text("newmtl a\nNs x\nnewmtl b\nNs 5\n")
+    status, _, err = run("mtl", "a.mtl", "-o", "b.mtl", cwd=tmp_path)
+    assert status == 1
+    assert "a.mtl:2: Ns 'x' is not a number: left as it is" in err
+    assert "Pr 0.70414138" in (tmp_path / "b.mtl").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["a.mtl"], "give either -o OUTPUT or --in-place"),
+        (["a.mtl", "-o", "x.mtl", "--in-place"], "give either -o OUTPUT or --in-place"),
+        (["a.mtl", "-o", "a.mtl"], "it is the input: use --in-place"),
+        (["a.mtl", "-o", "b.mtl"], "will not write b.mtl: it exists"),
+        (["a.mtl", "b.mtl", "-o", "x.mtl"], "2 libraries need a folder"),
+        (["a.mtl", "sub/a.mtl", "-o", "new"], "would both be written to new/a.mtl"),
+        (["none.mtl", "-o", "x.mtl"], "cannot read none.mtl"),
+        (["*.none", "-o", "x.mtl"], "cannot read *.none"),
+        (["sub", "-o", "x.mtl"], "cannot read sub: Is a directory"),
+        (["a.mtl", "-o", "none/x.mtl"], "cannot write none/x.mtl"),
+        (["a.mtl", "-o", "x.mtl", "--to", "glossiness"], "not to 'glossiness'"),
+        (["a.mtl", "-o", "x.mtl", "--metric", "light"], "unknown metric"),
+        (["a.mtl", "-o", "x.mtl", "--to", "shininess", "--compare"], "--compare and --textures"),
+    ],
+)
+def test_mistakes(words, message, tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "new").mkdir()
+    for name in ("a.mtl", "b.mtl", "sub/a.mtl"):
+        (tmp_path / name).write_bytes(SOURCE)
+    before = sorted(tmp_path.rglob("*"))
+    status, out, err = run("mtl", *words, cwd=tmp_path)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert len(err.splitlines()) == 1
+    assert sorted(tmp_path.rglob("*")) == before
+    assert (tmp_path / "a.mtl").read_bytes() == SOURCE
+
+
+def test_errors_are_those_of_the_conversion():
+    exponents = [0.5, 3.0, 40.0, 5000.0]
+    data = b"".join(b"newmtl a\nNs %g\n" % exponent for exponent in exponents)
+    found = convert_mtl(data).materials
+    exact = mdfconv.explain(exponents, "blinn-phong", "ggx:roughness", "fit", metric="energy")
+    for entry, wanted in zip(found, exact, strict=True):
+        assert entry.rmse == pytest.approx(wanted.rmse, rel=1e-4)
+    assert not any(math.isnan(entry.rmse) for entry in found)
+    assert np.all(np.diff([entry.roughness for entry in found]) < 0)
+
+
+def test_textures_are_converted_beside_the_result(tmp_path):
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "out").mkdir()
+    texels = np.array([[0, 25, 128, 255]], np.uint8)
+    Image.fromarray(texels).save(tmp_path / "maps" / "shine.png")
+    library = "newmtl a\nNs 50\nmap_Ns -s 2 2 1 maps\\shine.png\nnewmtl b\nmap_Ns none.png\n"
+    (tmp_path / "a.mtl").write_text(library)
+    status, _, err = run("mtl", "a.mtl", "-o", "out", "--textures", cwd=tmp_path)
+    assert status == 1
+    assert "a.mtl:5: " in err
+    written = (tmp_path / "out" / "a.mtl").read_text()
+    assert "map_Pr -s 2 2 1 shine_Pr.png\n" in written
+    assert written.count("map_Pr") == 1
+    got = np.asarray(Image.open(tmp_path / "out" / "shine_Pr.png"))[0]
+    exponents = texels[0, 1:] / 255 * 1000
+    exact = mdfconv.convert(exponents, "blinn-phong", "ggx:roughness", "fit", metric="energy")
+    assert got[0] == 255
+    assert np.abs(got[1:] / 255 - exact).max() <= 0.5 / 255 + 1e-9
+    read_back = read((tmp_path / "out" / "a.mtl").read_bytes(), tmp_path)
+    assert read_back["a"]["roughness_texname"] == "shine_Pr.png"

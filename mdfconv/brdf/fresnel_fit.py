@@ -118,7 +118,8 @@ def fit(
     weight = _check(ior, mu, sigma)
     cosine = grid()
     counts = weight(cosine)
-    if np.square(counts.sum()) < _FEWEST_POINTS * np.square(counts).sum():
+    # A weight between two points underflows to 0 everywhere.
+    if not np.square(counts.sum()) >= _FEWEST_POINTS * np.square(counts).sum() > 0:
         raise MdfconvError("the weight is narrower than the grid of the fit: raise --sigma")
     target, root, path = rescaled(cosine, ior), np.sqrt(counts), 2 * np.square(cosine)
     # A residual has a scale of its own, which a small index contrast makes tiny.

@@ -15,6 +15,7 @@ from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError, unknown_name
 
 _MIRROR = np.array([-1.0, -1.0, 1.0])
+_LARGEST_RECURRENCE = 1e5
 
 
 def _lobe(light: Array, view: Array, exponent: float) -> Array:
@@ -81,7 +82,7 @@ def normalization(normalizer: str, cosine: Array, exponent: float) -> Array:
     cosine : numpy.ndarray
         Cosine of the viewer with the normal, [0, 1].
     exponent : float
-        γ ≥ 0; an integer for ``"arvo"``.
+        γ ≥ 0; an integer up to 10⁵ for ``"arvo"``.
 
     Raises
     ------
@@ -104,6 +105,10 @@ def arvo(cosine: Array, exponent: float) -> Array:
     """Return I_M for an integer exponent by recurrence, in O(γ) (Arvo 1995)."""
     if exponent != round(exponent):
         raise MdfconvError(f"Arvo's normalizer takes an integer exponent, not {exponent:g}")
+    if exponent > _LARGEST_RECURRENCE:
+        raise MdfconvError(
+            f"Arvo's normalizer takes {exponent:g} steps: use mallett-yuksel, which takes one"
+        )
     sine_square = (1 - cosine) * (1 + cosine)
     even = exponent % 2 == 0
     angle = np.full_like(cosine, np.pi / 2) if even else np.pi - np.arccos(cosine)

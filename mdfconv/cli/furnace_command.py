@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from mdfconv.distributions.evaluation import Array
 
 _MOST_POINTS = 10_001
+_MOST_SAMPLES = 10_000_000
 
 
 def command(
@@ -68,6 +69,7 @@ def command(
 
     Prints the directional albedo, which is 1 if no energy is lost or made, over the cosine of
     the viewer with the normal; the Fresnel term is 1. By quadrature, with --mc also by sampling.
+    At cos θ = 0 it is taken at 1e-8.
 
     Examples:
 
@@ -84,14 +86,20 @@ def command(
     from mdfconv.brdf.models import furnace_model
 
     if speed:
-        if brdf != "modified-phong" or normalizer or samples or png:
+        if brdf != "modified-phong":
             raise MdfconvError("--speed compares the normalizers of --brdf modified-phong")
+        if normalizer or samples or png:
+            raise MdfconvError("--speed takes no --normalizer, --mc or --png: it is a table of all")
         _write_speed(parameter, format_, output)
         return
     if not 2 <= points <= _MOST_POINTS:
         raise MdfconvError(f"--points is from 2 to {_MOST_POINTS}")
-    if samples is not None and samples < 2:
-        raise MdfconvError("--mc needs 2 samples or more")
+    if samples is not None and not 2 <= samples <= _MOST_SAMPLES:
+        raise MdfconvError(f"--mc needs 2 samples or more, at most {_MOST_SAMPLES}")
+    if seed < 0:
+        raise MdfconvError(f"--seed is at least 0, not {seed}")
+    if png and output and png.resolve() == output.resolve():
+        raise MdfconvError(f"{png} is named for two results")
     model = furnace_model(brdf, parameter, normalizer=normalizer, masking=masking)
     rows = _rows(model, np.linspace(0, 1, points), samples, seed)
     title = f"White furnace: {brdf} {parameter:g}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -33,10 +34,8 @@ def command(
         ),
     ],
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", metavar="OUT", help="New file; for several libraries a folder."
-        ),
+        str | None,
+        typer.Option("--output", "-o", metavar="OUT", help="New file, or a folder that exists."),
     ] = None,
     to: Annotated[
         str,
@@ -114,11 +113,12 @@ def command(
             problems += [(place.source, *problem) for problem in failed]
         conversion = convert_mtl(data, wanted, metric=measure, replace=replace, texture_names=names)
         found.append((place, data, conversion))
-    write_libraries(found)
+    written = write_libraries(found)
     _report(found, measure, form=format_, compare=compare)
     for place, _, conversion in found:
         problems += [(place.source, *problem) for problem in conversion.problems]
-        typer.echo(f"mdfconv: wrote {place.output}", err=True)
+        done = "wrote" if place in written else "nothing to change in"
+        typer.echo(f"mdfconv: {done} {place.output}", err=True)
     for path, line, text in problems:
         typer.echo(f"mdfconv: {path}:{line}: {text}: left as it is", err=True)
     if problems:
@@ -204,8 +204,8 @@ def _print_table(record: dict[str, Any]) -> None:
         numbers = (row["shininess"], row["roughness"])
         table.add_row(
             escape(row["name"]),
-            *(f"{number:.6g}" for number in numbers),
-            f"{row['rmse']:.3g}",
+            *("—" if math.isnan(number) else f"{number:.6g}" for number in numbers),
+            "—" if math.isnan(row["rmse"]) else f"{row['rmse']:.3g}",
             *(f"{row[rule]['roughness']:.3g} ({_error(row[rule]['rmse'])})" for rule in rules),
             "; ".join(row["notes"]),
         )

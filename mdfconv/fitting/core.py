@@ -14,6 +14,7 @@ import numpy as np
 
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Indices
+from mdfconv.fitting.level import level_crossing
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.quadrature import LobeQuadrature, Quadrature
 
@@ -36,7 +37,6 @@ _LOWER = 0.98
 _SECANT_TOLERANCE = 1e-6
 _LINEAR_TOLERANCE = 1e-10
 _AT_END = 1e-7
-_BISECTIONS = 60
 # An encoding for a screen rises like a root where a distribution leaves 0.
 _TOWARDS_EDGE = 1 - np.append(0.25 ** np.arange(1, 10), 0)
 _ROWS_AT_ONCE = 32
@@ -191,21 +191,8 @@ class _Problem:
             ends = [(mode, np.full_like(mode, 0.5 * np.pi))]
             if np.any(mode > 0):
                 ends.append((mode, np.zeros_like(mode)))
-            found += [_crossing(distribution, parameter, level, *end) for end in ends]
+            found += [level_crossing(distribution, parameter, level, *end) for end in ends]
         return np.concatenate(found, axis=1)
-
-
-def _crossing(
-    distribution: Distribution, parameter: Array, level: Array, high: Array, low: Array
-) -> Array:
-    """Return by bisection the angle at which D̄ crosses a level between two angles, 0 if none."""
-    crosses = (level < 1) & (distribution.shape(low, parameter) < level)
-    for _ in range(_BISECTIONS):
-        # Geometric steps resolve a mirror's lobe; arithmetic ones reach an end at 0.
-        middle = np.where(np.minimum(low, high) > 1e-12, np.sqrt(low * high), 0.5 * (low + high))
-        above = distribution.shape(middle, parameter) >= level
-        high, low = np.where(above, middle, high), np.where(above, low, middle)
-    return np.where(crosses, 0.5 * (low + high), 0)
 
 
 def _fit_block(problem: _Problem) -> tuple[Array, Array, Array]:

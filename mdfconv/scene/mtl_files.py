@@ -47,15 +47,15 @@ def find_libraries(patterns: Sequence[str]) -> list[Path]:
     return list(found)
 
 
-def place_outputs(libraries: Sequence[Path], output: Path | None, *, in_place: bool) -> list[Place]:
+def place_outputs(libraries: Sequence[Path], output: str | None, *, in_place: bool) -> list[Place]:
     """Return where each library's conversion goes.
 
     Parameters
     ----------
     libraries : sequence of Path
         The libraries.
-    output : Path or None
-        A file for one of them, or a folder.
+    output : str or None
+        A file for one of them, or a folder, which exists.
     in_place : bool
         Write over the library itself and keep the original beside it.
 
@@ -69,12 +69,15 @@ def place_outputs(libraries: Sequence[Path], output: Path | None, *, in_place: b
     if output is None:
         real = [library.resolve() for library in libraries]
         return [Place(library, library, _free_backup(library)) for library in dict.fromkeys(real)]
-    if not output.is_dir():
-        if len(libraries) > 1:
-            raise MdfconvError(f"{len(libraries)} libraries need a folder: {output} is not one")
-        places = [Place(libraries[0], output)]
+    folder = Path(output)
+    if folder.is_dir():
+        places = [Place(library, folder / library.name) for library in libraries]
+    elif len(libraries) > 1:
+        raise MdfconvError(f"{len(libraries)} libraries need a folder: {output} is not one")
+    elif output.endswith(("/", os.sep)) or output == "-":
+        raise MdfconvError(f"cannot write {output}: it is not a file or an existing folder")
     else:
-        places = [Place(library, output / library.name) for library in libraries]
+        places = [Place(libraries[0], folder)]
     outputs = [place.output for place in places]
     for place in places:
         if place.output.exists():
@@ -109,25 +112,35 @@ def read_library(path: Path) -> bytes:
         raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
 
 
-def write_libraries(converted: Sequence[tuple[Place, bytes, MtlConversion]]) -> None:
+def write_libraries(converted: Sequence[tuple[Place, bytes, MtlConversion]]) -> list[Place]:
     """Write all conversions, and backups first, or nothing.
+
+    What a conversion in place does not change is not written.
 
     Parameters
     ----------
     converted : sequence of (Place, bytes, MtlConversion)
         For each library its place, its original and its conversion.
 
+    Returns
+    -------
+    list of Place
+        What was written.
+
     Raises
     ------
     MdfconvError
         If a place cannot be written; nothing is then changed.
     """
-    contents: dict[Path, bytes] = {}
-    for place, original, _ in converted:
-        if place.backup:
-            contents[place.backup] = original
-    contents |= {place.output: conversion.data for place, _, conversion in converted}
-    modes = {place.output: place.output.stat().st_mode for place, *_ in converted if place.backup}
+    changed = [
+        (place, original, conversion.data)
+        for place, original, conversion in converted
+        if not (place.backup and conversion.data == original)
+    ]
+    contents = {place.backup: original for place, original, _ in changed if place.backup}
+    contents |= {place.output: data for place, _, data in changed}
+    modes = {place.output: place.output.stat().st_mode for place, *_ in changed if place.backup}
     write_files(contents)
     for path, mode in modes.items():
         path.chmod(mode)
+    return [place for place, *_ in changed]

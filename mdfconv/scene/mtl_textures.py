@@ -46,17 +46,19 @@ def convert_textures(
     )
     rule.endpoints()
     names: dict[str, str] = {}
+    done: dict[Path, str] = {}
     problems = []
     for texture in textures:
         # Libraries from Windows separate folders by backslashes.
         source = library.parent / texture.file.replace("\\", "/")
         target = output.parent / f"{source.stem}_Pr{source.suffix}"
         try:
-            if texture.file not in names:
+            if source not in done:
                 if target.exists():
                     raise MdfconvError(f"will not write {target}: it exists")
                 convert_texture_file(source, target, rule)
-                names[texture.file] = target.name
+                done[source] = target.name
+            names[texture.file] = done[source]
         except MdfconvError as error:
             problems.append((texture.line, str(error)))
         advance(1)

@@ -218,12 +218,14 @@ def test_in_place_keeps_the_original(tmp_path):
     for name in ("a.mtl", "b.mtl"):
         (tmp_path / name).write_bytes(SOURCE)
     (tmp_path / "a.mtl").chmod(0o640)
-    for _ in range(2):
-        status, _, _ = run("mtl", "--in-place", "*.mtl", cwd=tmp_path)
+    for words, done in (([], "wrote"), ([], "nothing to change in"), (["--replace"], "wrote")):
+        status, _, err = run("mtl", "--in-place", "*.mtl", *words, cwd=tmp_path)
         assert status == 0
+        assert err.count(f"mdfconv: {done} ") == 2
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {f"{x}.mtl{end}" for x in "ab" for end in ("", ".bak", ".bak2")}
-    assert (tmp_path / "a.mtl").read_bytes() == CONVERTED
+    assert (tmp_path / "a.mtl.bak2").read_bytes() == CONVERTED
+    assert b"Ns" not in (tmp_path / "a.mtl").read_bytes()
     assert (tmp_path / "a.mtl.bak").read_bytes() == SOURCE
     assert (tmp_path / "a.mtl").stat().st_mode & 0o777 == 0o640
 
@@ -249,6 +251,8 @@ def test_a_bad_statement_turns_the_status_to_1(tmp_path):
         (["*.none", "-o", "x.mtl"], "cannot read *.none"),
         (["sub", "-o", "x.mtl"], "cannot read sub: Is a directory"),
         (["a.mtl", "-o", "none/x.mtl"], "cannot write none/x.mtl"),
+        (["a.mtl", "-o", "none/"], "not a file or an existing folder"),
+        (["a.mtl", "-o", "-"], "not a file or an existing folder"),
         (["a.mtl", "-o", "x.mtl", "--to", "glossiness"], "not to 'glossiness'"),
         (["a.mtl", "-o", "x.mtl", "--metric", "light"], "unknown metric"),
         (["a.mtl", "-o", "x.mtl", "--to", "shininess", "--compare"], "--compare and --textures"),
@@ -285,13 +289,14 @@ def test_textures_are_converted_beside_the_result(tmp_path):
     texels = np.array([[0, 25, 128, 255]], np.uint8)
     Image.fromarray(texels).save(tmp_path / "maps" / "shine.png")
     library = "newmtl a\nNs 50\nmap_Ns -s 2 2 1 maps\\shine.png\nnewmtl b\nmap_Ns none.png\n"
+    library += "newmtl c\nmap_Ns maps/shine.png\n"
     (tmp_path / "a.mtl").write_text(library)
     status, _, err = run("mtl", "a.mtl", "-o", "out", "--textures", cwd=tmp_path)
     assert status == 1
     assert "a.mtl:5: " in err
     written = (tmp_path / "out" / "a.mtl").read_text()
     assert "map_Pr -s 2 2 1 shine_Pr.png\n" in written
-    assert written.count("map_Pr") == 1
+    assert written.count("map_Pr") == 2
     got = np.asarray(Image.open(tmp_path / "out" / "shine_Pr.png"))[0]
     exponents = texels[0, 1:] / 255 * 1000
     exact = mdfconv.convert(exponents, "blinn-phong", "ggx:roughness", "fit", metric="energy")

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 
@@ -165,10 +165,7 @@ def pack(maps: dict[str, Map]) -> dict[str, Array]:
 @cache
 def load() -> dict[str, Map]:
     """Return the stored maps; their names are metric, source and target between blanks."""
-    with (
-        files(__package__).joinpath("data", DATA).open("rb") as file,
-        np.load(file) as stored,
-    ):
+    with np.load(Path(__file__).parent / "data" / DATA) as stored:
         content = {name: stored[name] for name in stored.files}
     terms = np.split(content["coefficients"], np.cumsum(content["terms"])[:-1])
     pieces = content["pieces"]

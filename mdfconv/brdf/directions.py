@@ -6,6 +6,8 @@ import numpy as np
 
 from mdfconv.distributions.evaluation import Array
 
+_MIRROR = np.array([-1.0, -1.0, 1.0])
+
 
 def direction(theta: Array | float, phi: Array | float = 0.0) -> Array:
     """Return unit vectors for angles from the normal and azimuths, radians."""
@@ -29,6 +31,11 @@ def unit(vectors: Array) -> Array:
 def reflect(view: Array, normal: Array) -> Array:
     """Return the mirror images of directions at normals: 2 (v·m) m − v."""
     return 2 * dot(view, normal)[..., None] * normal - view
+
+
+def mirrored(view: Array) -> Array:
+    """Return the mirror images of directions at the surface normal, exactly: (−x, −y, z)."""
+    return view * _MIRROR
 
 
 def half_vector(light: Array, view: Array) -> Array:

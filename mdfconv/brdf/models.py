@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mdfconv.brdf import phong, smoothie
-from mdfconv.brdf.directions import dot, reflect
+from mdfconv.brdf.directions import dot, mirrored, reflect
 from mdfconv.brdf.furnace import FurnaceModel, Reflection, Sampler
 from mdfconv.brdf.masking import masking as find_masking
 from mdfconv.brdf.microfacet import ashikhmin_shirley, reflection
@@ -27,8 +27,6 @@ from mdfconv.distributions import distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.smoothie import to_ggx
 from mdfconv.errors import MdfconvError, unknown_name
-
-_MIRROR = np.array([-1.0, -1.0, 1.0])
 
 
 def furnace_model(
@@ -99,7 +97,7 @@ def _microfacet_sampler(name: str, alpha: float) -> Sampler:
 
 def _phong(reflect_light: Reflection, exponent: float) -> FurnaceModel:
     def sample(view: Array, u1: Array, u2: Array) -> tuple[Array, Array]:
-        axis = view * _MIRROR
+        axis = mirrored(view)
         light = cosine_lobe(axis, exponent, u1, u2)
         return light, cosine_lobe_density(axis, exponent, light)
 
@@ -107,23 +105,17 @@ def _phong(reflect_light: Reflection, exponent: float) -> FurnaceModel:
 
 
 def _original_phong(exponent: float, normalizer: str, masking: str) -> FurnaceModel:
-    _check_exponent(exponent)
+    phong.check_exponent(exponent)
     return _phong(lambda light, view: phong.original(light, view, exponent), exponent)
 
 
 def _modified_phong(exponent: float, normalizer: str, masking: str) -> FurnaceModel:
-    _check_exponent(exponent)
     phong.normalization(normalizer, np.ones(1), exponent)
 
     def reflect_light(light: Array, view: Array) -> Array:
         return phong.modified(light, view, exponent, normalizer)
 
     return _phong(reflect_light, exponent)
-
-
-def _check_exponent(exponent: float) -> None:
-    if not 0 <= exponent < np.inf:
-        raise MdfconvError(f"Phong's exponent is at least 0, not {exponent:g}")
 
 
 def _smoothie(

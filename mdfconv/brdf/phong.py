@@ -11,20 +11,24 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import betainc, poch
 
+from mdfconv.brdf.directions import mirrored
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError, unknown_name
 
-_MIRROR = np.array([-1.0, -1.0, 1.0])
 _LARGEST_RECURRENCE = 1e5
+
+
+def check_exponent(exponent: float) -> None:
+    """Raise an MdfconvError unless an exponent is a finite number from 0 up."""
+    if not 0 <= exponent < np.inf:
+        raise MdfconvError(f"Phong's exponent is at least 0, not {exponent:g}")
 
 
 def _lobe(light: Array, view: Array, exponent: float) -> Array:
     """Return cos^γ θ_r above the surface, 0 elsewhere, with its digits near the mirror image."""
-    if not exponent >= 0:
-        raise MdfconvError(f"Phong's exponent is at least 0, not {exponent:g}")
-    mirrored = view * _MIRROR
+    check_exponent(exponent)
     # cos θ = 1 − ½|l − r|²; the chord keeps what 1 − cos loses.
-    drop = 0.5 * np.square(light - mirrored).sum(axis=-1)
+    drop = 0.5 * np.square(light - mirrored(view)).sum(axis=-1)
     lit = (light[..., 2] > 0) & (view[..., 2] > 0) & (drop < 1)
     with np.errstate(divide="ignore"):
         value = np.exp(exponent * np.log1p(-np.where(lit, drop, 0)))
@@ -91,8 +95,7 @@ def normalization(normalizer: str, cosine: Array, exponent: float) -> Array:
     """
     if normalizer not in NORMALIZERS:
         raise unknown_name("normalizer", normalizer, list(NORMALIZERS))
-    if not 0 <= exponent < np.inf:
-        raise MdfconvError(f"Phong's exponent is at least 0, not {exponent:g}")
+    check_exponent(exponent)
     return NORMALIZERS[normalizer](np.asarray(cosine, float), float(exponent))
 
 

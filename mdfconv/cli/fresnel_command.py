@@ -7,8 +7,14 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli.output import FileOption, FormOption, TableFormat, default_form, write_records
-from mdfconv.errors import MdfconvError
+from mdfconv.cli.output import (
+    FileOption,
+    FormOption,
+    TableFormat,
+    check_distinct,
+    default_form,
+    write_records,
+)
 
 
 def command(
@@ -47,8 +53,7 @@ def command(
     from mdfconv.reports.fresnel_page import COLUMNS, draw_fresnel, error_rows
     from mdfconv.reports.text import write_files
 
-    if png and output and png.absolute() == output.absolute():
-        raise MdfconvError(f"{png} is named for two results")
+    check_distinct(png, output)
     found = fit(ior, mu, sigma)
     rows = error_rows(found)
     form = format_ or default_form(output)

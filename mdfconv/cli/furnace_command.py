@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.output import FileOption, FormOption, write_records
+from mdfconv.cli.output import FileOption, FormOption, check_distinct, write_records
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
@@ -98,8 +98,7 @@ def command(
         raise MdfconvError(f"--mc needs 2 samples or more, at most {_MOST_SAMPLES}")
     if seed < 0:
         raise MdfconvError(f"--seed is at least 0, not {seed}")
-    if png and output and png.resolve() == output.resolve():
-        raise MdfconvError(f"{png} is named for two results")
+    check_distinct(png, output)
     model = furnace_model(brdf, parameter, normalizer=normalizer, masking=masking)
     rows = _rows(model, np.linspace(0, 1, points), samples, seed)
     title = f"White furnace: {brdf} {parameter:g}"

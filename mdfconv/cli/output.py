@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from mdfconv.distributions.parameter import number_text
+from mdfconv.errors import MdfconvError
 from mdfconv.reports.text import (
     Record,
     cell_text,
@@ -123,6 +124,12 @@ def print_table(table: Any) -> None:
     if needed > out.width:
         out = Console(width=needed, highlight=False)
     out.print(table)
+
+
+def check_distinct(png: Path | None, output: Path | None) -> None:
+    """Raise if a picture and a table are to go into one file."""
+    if png and output and png.resolve() == output.resolve():
+        raise MdfconvError(f"{png} is named for two results")
 
 
 def default_form(output: Path | None) -> TableFormat:

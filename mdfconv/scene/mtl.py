@@ -215,6 +215,11 @@ def _material(block: _Block, to: str, value: float, result: float, error: float)
     return Material(block.name, block.sources[-1].number, *pair, error, tuple(notes))
 
 
+def _usual_end(lines: list[Line]) -> bytes:
+    """Return what ends the lines of a library, for a last line that nothing ends."""
+    return next((line.end for line in lines if line.end), b"\n")
+
+
 def _edited(
     lines: list[Line],
     blocks: list[_Block],
@@ -225,7 +230,7 @@ def _edited(
 ) -> list[bytes]:
     """Return the lines, ends included, with the targets set; a dropped line is empty."""
     texts = [line.content + line.end for line in lines]
-    default_end = next((line.end for line in lines if line.end), b"\n")
+    default_end = _usual_end(lines)
     for block, material in zip(blocks, materials, strict=True):
         result = None if material is None else _result(material, keywords[1])
         if result is None:
@@ -275,7 +280,7 @@ def _set_textures(
     replace: bool,
 ) -> None:
     """Name the converted textures, in a line of their own or in the place of the others."""
-    default_end = next((line.end for line in lines if line.end), b"\n")
+    default_end = _usual_end(lines)
     targets = {line.material: line for line in lines if line.keyword == keyword}
     for texture in textures:
         line = lines[texture.line - 1]

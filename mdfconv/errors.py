@@ -9,30 +9,18 @@ class MdfconvError(ValueError):
     """A request that cannot be answered; the message is written for the user.
 
     The command line prints the message as one line and exits with status 2.
-    """
-
-
-def check_name(kind: str, name: object) -> str:
-    """Return a name that is a string; raise `MdfconvError` for anything else."""
-    if not isinstance(name, str):
-        raise MdfconvError(f"a {kind} is named by a string, not {name!r}")
-    return name
-
-
-def unknown_name(kind: str, name: str, known: list[str]) -> MdfconvError:
-    """Return the error for a name that is not known, with the nearest ones that are.
 
     Parameters
     ----------
-    kind : str
-        What the name was meant to name, such as ``"distribution"``.
-    name : str
-        The name as the user wrote it.
-    known : list of str
-        Every name that would have been accepted.
+    reason : str
+        What is wrong.
+    hint : str
+        What would be right, if that is known.
+    argument : str
+        The name of the argument that would make it right, if there is one: the command line adds
+        the option of that name.
     """
-    from difflib import get_close_matches
 
-    near = get_close_matches(name.lower(), known, n=3, cutoff=0.5)
-    hint = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known)}"
-    return MdfconvError(f"unknown {kind} '{name}'; {hint}")
+    def __init__(self, reason: str, hint: str = "", *, argument: str = "") -> None:
+        super().__init__(f"{reason}; {hint}" if hint else reason)
+        self.reason, self.hint, self.argument = reason, hint, argument

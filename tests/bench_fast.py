@@ -16,10 +16,11 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 
 import mdfconv
-from mdfconv.fitting.core import fit
-from mdfconv.fitting.metrics import list_metrics, metric
+from mdfconv.distributions import distribution, one_parameter_distributions
+from mdfconv.fitting.fit import fit
+from mdfconv.fitting.metrics import list_metrics, metric_named
 
-NAMES = ("beckmann", "gauss", "ggx", "blinn-phong", "sawicki", "schlick", "smoothie")
+NAMES = [entry.name for entry in one_parameter_distributions() if entry.map_variables]
 LIMIT = {"unit": 1e-6, "energy": 1e-6, "display": 1e-4}
 MILLION = 1_000_000
 REPEATS = 7
@@ -28,11 +29,10 @@ REPEATS = 7
 def parameters(name, count):
     """Return random parameters: roughness from 1e-4 to 1, half of it uniform, half logarithmic."""
     random = np.random.default_rng(len(name))
-    half = count // 2
-    alpha = np.concatenate([random.uniform(0, 1, half), 10 ** random.uniform(-4, 0, count - half)])
-    if name in ("blinn-phong", "sawicki"):
+    if distribution(name).parameter.larger_is_smoother:
         return 10 ** random.uniform(-1, 6, count)
-    return alpha
+    half = count // 2
+    return np.concatenate([random.uniform(0, 1, half), 10 ** random.uniform(-4, 0, count - half)])
 
 
 def compare(job):
@@ -42,8 +42,7 @@ def compare(job):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", mdfconv.MdfconvWarning)
         fast = mdfconv.convert(values, source, target, method="fast", metric=name)
-    sides = mdfconv.distribution(source), mdfconv.distribution(target)
-    exact = fit(sides[0], values, sides[1], metric(name)).parameter
+    exact = fit(distribution(source), values, distribution(target), metric_named(name)).parameter
     answered = np.isfinite(fast)
     worst = float(np.max(np.abs(fast[answered] / exact[answered] - 1)))
     return worst, int(answered.sum()), int(np.isfinite(exact).sum())
@@ -62,7 +61,8 @@ def seconds(function):
 def speed(name, source, target):
     """Print conversions a second of both methods."""
     values = np.resize(parameters(source, 2000), MILLION)
-    values = np.clip(values, 1e-3, 0.8) if source != "blinn-phong" else np.clip(values, 1, None)
+    exponent = distribution(source).parameter.larger_is_smoother
+    values = np.clip(values, 1, None) if exponent else np.clip(values, 1e-3, 0.8)
     fast = MILLION / seconds(lambda: mdfconv.convert(values, source, target, "fast", metric=name))
     few = values[:20].tolist()
     single = len(few) / seconds(

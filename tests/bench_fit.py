@@ -13,32 +13,33 @@ import numpy as np
 from scipy.optimize import curve_fit
 
 import mdfconv
-from mdfconv.fitting.core import fit
-from mdfconv.fitting.metrics import Unit
+from mdfconv.fitting.fit import fit
+from mdfconv.fitting.metrics.unit import Unit
 from mdfconv.fitting.quadrature import UniformSamples
 from mdfconv.measured.lobe_fit import fit_lobe
 from mdfconv.measured.merl import read_merl
-from mdfconv.reports.table2 import FITTED, SAMPLES, paper_sweep
-from tests.fitting.brute_force import FORMS
+from mdfconv.paper.table2 import FITTED, SAMPLES, paper_sweep
 
 REPEATS = 15
 
 
-def batched(m_b, reach):
+def batched(m_b, limit):
     """Fit the four columns as the package does."""
-    samples = UniformSamples(reach, SAMPLES)
+    samples = UniformSamples(limit, SAMPLES)
     source = mdfconv.distribution("beckmann")
     for name in FITTED.values():
         fit(source, m_b, mdfconv.distribution(name), Unit(), samples)
 
 
-def looped(m_b, reach):
+def looped(m_b, limit):
     """Fit the 68 cells one by one, from the start that equation (11) suggests."""
-    for name in FITTED.values():
-        for m, end in zip(m_b, reach, strict=True):
+    source = mdfconv.distribution("beckmann")
+    for target in map(mdfconv.distribution, FITTED.values()):
+        for m, end in zip(m_b, limit, strict=True):
             beta = np.linspace(0, end, SAMPLES)
-            start = 2 / m**2 if name in ("blinn-phong", "sawicki") else m
-            curve_fit(FORMS[name], beta, FORMS["beckmann"](beta, m), p0=[start])
+            start = 2 / m**2 if target.parameter.larger_is_smoother else m
+            with np.errstate(all="ignore"):
+                curve_fit(target.printed.unit, beta, source.printed.unit(beta, m), p0=[start])
 
 
 def merl(path):

@@ -15,13 +15,19 @@ from numpy.polynomial import chebyshev
 
 import mdfconv
 from mdfconv.conversion import fast
-from mdfconv.conversion.residual import residual
-from mdfconv.fitting.core import fit
-from mdfconv.fitting.metrics import list_metrics, metric
+from mdfconv.conversion.equivalence import exact_route
+from mdfconv.conversion.remaining_error import remaining_error
+from mdfconv.distributions import one_parameter_distributions
+from mdfconv.fitting.fit import fit
+from mdfconv.fitting.metrics import list_metrics, metric_named
 
 FILE = Path(fast.__file__).parent / "data" / fast.DATA
-SOURCES = ("beckmann", "gauss", "ggx", "blinn-phong", "sawicki", "schlick")
-TARGETS = (*SOURCES, "smoothie")
+# A distribution that is another one in another parameter is a target of its own: near a uniform
+# lobe its parameter resolves more.
+TARGETS = [entry.name for entry in one_parameter_distributions() if entry.map_variables]
+SOURCES = [name for name in TARGETS if name != "smoothie"]
+# Lobes that become uniform at x = 1, and those that can become so with relative precision.
+UNIFORM_SOURCES, UNIFORM_TARGETS = ("ggx", "schlick"), ("gauss", "ggx", "blinn-phong", "smoothie")
 # A tenth or less of what the method promises.
 TOLERANCE = {"unit": 5e-8, "energy": 5e-8, "display": 2e-5}
 # The roughest source of each kind; towards a uniform lobe both ends are singular.
@@ -41,35 +47,34 @@ class Pair:
     def __init__(self, source, target, metric_name):
         self.names = source, target
         self.source, self.target = mdfconv.distribution(source), mdfconv.distribution(target)
-        self.metric = metric(metric_name)
-        self.factored = fast.uniform_together(source, target)
+        self.metric = metric_named(metric_name)
+        self.variables = self.source.map_variables, self.target.map_variables
+        self.factored = source in UNIFORM_SOURCES and target in UNIFORM_TARGETS
         self.tolerance = TOLERANCE[metric_name]
 
-    def given(self, x):
+    def parameter(self, x):
         """Return the source's parameter for x."""
-        x = np.atleast_1d(x)
-        inverse = {"blinn-phong": 2 / x**2 - 2, "sawicki": 8 / (3 * x**2) - 3}
-        return inverse.get(self.names[0], x)
+        return self.variables[0].from_width(np.atleast_1d(x))
 
     def answer(self, x):
         """Return the fit's parameter, NaN where there is none that is usable."""
-        got = fit(self.source, self.given(x), self.target, self.metric).parameter
+        got = fit(self.source, self.parameter(x), self.target, self.metric).parameter
         with np.errstate(invalid="ignore"):
             return np.where(got >= LEAST_TARGET.get(self.names[1], 0), got, np.nan)
 
     def limited(self, x):
         """Return where the fit lies at the end of the target's legal range."""
-        return fit(self.source, self.given(x), self.target, self.metric).at_limit
+        return fit(self.source, self.parameter(x), self.target, self.metric).at_limit
 
     def stored(self, x, answer):
         """Return the function that is to be stored."""
-        product = x * x * fast.SIDES[self.names[1]].excess(answer)
+        product = x * x * self.variables[1].concentration(answer)
         return product / ((1 - x) * (1 + x)) if self.factored else product
 
     def from_stored(self, x, value):
         """Return the parameter for the stored function."""
         product = value * (1 - x) * (1 + x) if self.factored else value
-        return fast.SIDES[self.names[1]].parameter(x, product)
+        return self.variables[1].from_map(x, product)
 
 
 def boundary(inside, low, high):
@@ -84,7 +89,7 @@ def outline(pair):
     """Return the end of the range and the x at which the fit is known not to be smooth."""
     source, target = pair.names
     roughest = 1.0 if target in BOUNDED and source == "schlick" else ROUGHEST.get(source, 1.0)
-    end = float(fast.SIDES[source].reach(np.float64(roughest)))
+    end = float(pair.variables[0].width(np.float64(roughest)))
     if pair.factored and source == "ggx":
         end = 1 - 1e-9
     grid = end * np.linspace(0, 1, 129)[1:]
@@ -156,11 +161,11 @@ def pieces(pair, low, high, depth=0):
 
 def errors_of(pair, end):
     """Return RMSE and maximum error of the fit at the places where they are stored."""
-    x = end * fast.ERROR_PLACES
+    x = end * fast.ERROR_SHARES
     # The end itself may be uniform.
     x[-1] *= 1 - 1e-9
-    given = pair.given(x)
-    return np.stack(residual(pair.source, given, pair.target, pair.answer(x), pair.metric))
+    given = pair.parameter(x)
+    return np.stack(remaining_error(pair.source, given, pair.target, pair.answer(x), pair.metric))
 
 
 def make(key):
@@ -176,7 +181,8 @@ def make(key):
         end = 1.0
     last = 1.0 if pair.factored and source == "ggx" else end
     edges = np.array([low for low, *_ in found] + [last])
-    entry = fast.Map(edges, tuple(power for _, _, power, _ in found), errors_of(pair, last))
+    powers = tuple(power for _, _, power, _ in found)
+    entry = fast.Map(edges, powers, errors_of(pair, last), pair.factored)
     worst = max(piece[-1] for piece in found)
     sizes = [power.size for _, _, power, _ in found]
     return key, entry, f"to x = {end:.6f}, worst {worst:.1e}, terms {sizes}"
@@ -188,7 +194,7 @@ def main(path=FILE):
         f"{name} {source} {target}"
         for name in list_metrics()
         for source, target in itertools.product(SOURCES, TARGETS)
-        if fast.SIDES[source].lobe != fast.SIDES[target].lobe
+        if exact_route(mdfconv.distribution(source), mdfconv.distribution(target)) is None
     ]
     maps = {}
     with ProcessPoolExecutor() as pool:

@@ -11,6 +11,7 @@ from pathlib import Path
 import mpmath as mp
 import numpy as np
 
+from mdfconv.distributions import distribution, one_parameter_distributions
 from tests import oracles, stability_fits
 
 DATA = Path(__file__).parents[1] / "mdfconv" / "benchmark" / "data"
@@ -22,15 +23,19 @@ NOTHING = mp.mpf("1e-330")
 TAIL = mp.mpf("1e-6")
 EDGE = "edge of support"
 
-NAMES = ["beckmann", "gauss", "ggx", "gtr", "blinn-phong", "schlick", "sawicki", "smoothie"]
-GAMMAS = {"gtr": [1.5, 4]}
-NEAR_ONE = ["1", *(f"{sign}{step}" for step in ("1e-12", "1e-6", "1e-3") for sign in "+-")]
+NAMES = [entry.name for entry in one_parameter_distributions()]
+GAMMAS = {"gtr": [1.5, 4], "student-t": [2.5, 4, 50]}
+STEPS = ("1e-12", "1e-6", "1e-3")
+NEAR_ONE = ["1", *(f"{sign}{step}" for step in STEPS for sign in "+-")]
+NEAR_TWO = [2, *(f"2+{step}" for step in STEPS)]
 
 USUAL = {"alpha": [0.01, 0.1, 0.5, 1], "exponent": [1, 7.3, 100, 20000]}
 MIRROR = {"alpha": [1e-8, 1e-5, 1e-3], "exponent": [60000, 1e10, 1e16]}
 GRAZING = {"alpha": [0.05, 0.3, 1], "exponent": [0.01, 1, 2.5, 20]}
 OFF_AXIS = [0.70711, 0.75, 1, 1.5, 3, 100, 1e5]
 NEARLY_UNIFORM = [1e-6, 0.05, 0.5, "1-1e-12", 1]
+# At γ = 2 the maximum is at the normal up to α = 1, and at the horizon beyond.
+NEAR_LIMIT = [0.05, 1, 3]
 EDGES = [1e-4, 0.05, 0.3, 0.9, 0.999]
 FROM_EDGE = ["1e-1", "1e-3", "1e-6", "1e-9", "1e-11", "1e-13", "1e-14", "1e-15"]  # relative
 # Of the width of the lobe, and from the horizon.
@@ -39,7 +44,7 @@ FROM_HORIZON = [0.1, 1e-2, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 0]
 
 
 def kind(name):
-    return "exponent" if name in oracles.EXPONENTS else "alpha"
+    return "exponent" if distribution(name).parameter.larger_is_smoother else "alpha"
 
 
 def in_type(values, dtype):
@@ -67,12 +72,13 @@ def grazing_angles(dtype):
 def edge_angles(parameter, dtype):
     """Return angles on both sides of the edge of Schlick's support, cos β = 1 − m."""
     edge = 2 * mp.asin(mp.sqrt(mp.mpf(float(parameter)) / 2))
-    sides = [edge * (1 + sign * mp.mpf(step)) for step in FROM_EDGE for sign in (1, -1)]
-    return in_type([float(side) for side in (edge, *sides) if side < oracles.HALF_PI], dtype)
+    around = [edge * (1 + sign * mp.mpf(step)) for step in FROM_EDGE for sign in (1, -1)]
+    return in_type([float(angle) for angle in (edge, *around) if angle < oracles.HALF_PI], dtype)
 
 
-def off_axis_angles(parameter, dtype):
-    mode = np.arctan(np.sqrt(max(2 * float(parameter) ** 2 - 1, 0)))
+def off_axis_angles(square, dtype):
+    """Return angles at and around a maximum at tan²β = `square`, and grazing ones."""
+    mode = np.arctan(np.sqrt(max(square, 0)))
     near = mode * np.array([0.5, 0.99, 1, 1.01])
     return [dtype(0), *in_type([*near[near < np.pi / 2], *grazing_angles(dtype)], dtype)]
 
@@ -82,7 +88,7 @@ def unit(name, beta, parameter, gamma):
     angle = mp.mpf(float(beta))
     angle = min(angle, mp.pi - angle)
     value = oracles.ratio_mp(name, angle, float(parameter), float(gamma))
-    return value / oracles.maximum(name, float(parameter))
+    return value / oracles.maximum(name, float(parameter), float(gamma))
 
 
 def kernel_inputs(name, dtype):
@@ -100,41 +106,69 @@ def kernel_inputs(name, dtype):
 
 def special_inputs(name, dtype):
     """Yield what only some distributions have."""
-    if name == "beckmann":
-        for parameter in in_type(OFF_AXIS, dtype):
-            for beta in off_axis_angles(parameter, dtype):
-                yield "off-axis maximum", parameter, 2, beta
-    if name == "schlick":
-        for parameter in in_type(EDGES, dtype):
-            for beta in edge_angles(parameter, dtype):
-                yield EDGE, parameter, 2, beta
-    if name == "gtr":
-        for gamma, alpha in near_one(dtype):
-            for beta in in_type([float(alpha), min(20 * float(alpha), 1.5)], dtype):
-                yield "γ near 1", alpha, gamma, beta
+    return SPECIAL.get(name, lambda dtype: ())(dtype)
 
 
-def near_one(dtype):
-    gammas = in_type([sum_of(text) for text in NEAR_ONE], dtype)
-    return [(g, a) for g in gammas for a in in_type(map(sum_of, NEARLY_UNIFORM), dtype)]
+def beckmann_inputs(dtype):
+    for parameter in in_type(OFF_AXIS, dtype):
+        for beta in off_axis_angles(2 * float(parameter) ** 2 - 1, dtype):
+            yield "off-axis maximum", parameter, 2, beta
+
+
+def schlick_inputs(dtype):
+    for parameter in in_type(EDGES, dtype):
+        for beta in edge_angles(parameter, dtype):
+            yield EDGE, parameter, 2, beta
+
+
+def gtr_inputs(dtype):
+    for gamma, alpha in near(NEAR_ONE, NEARLY_UNIFORM, dtype):
+        for beta in in_type([float(alpha), min(20 * float(alpha), 1.5)], dtype):
+            yield "γ near 1", alpha, gamma, beta
+
+
+def student_t_inputs(dtype):
+    for gamma, alpha in near(GAMMAS["student-t"], OFF_AXIS, dtype):
+        square = float(oracles.mode_square("student-t", float(alpha), float(gamma)))
+        if square:
+            for beta in off_axis_angles(square, dtype):
+                yield "off-axis maximum", alpha, gamma, beta
+    for gamma, alpha in near(NEAR_TWO, NEAR_LIMIT, dtype):
+        for beta in (*lobe_angles("student-t", alpha, dtype)[::3], *grazing_angles(dtype)):
+            yield "γ near 2", alpha, gamma, beta
+
+
+SPECIAL = {
+    "beckmann": beckmann_inputs,
+    "schlick": schlick_inputs,
+    "gtr": gtr_inputs,
+    "student-t": student_t_inputs,
+}
+
+
+def near(gammas, alphas, dtype):
+    gammas, alphas = (in_type(map(sum_of, values), dtype) for values in (gammas, alphas))
+    return [(gamma, alpha) for gamma in gammas for alpha in alphas]
 
 
 def sum_of(text):
-    """Return the float for a number, or for a text such as 1-1e-6 or +1e-6 (from 1)."""
+    """Return the float for a number, or for a text such as 1-1e-6, 2+1e-6 or +1e-6 (from 1)."""
     if not isinstance(text, str) or text == "1":
         return float(text)
-    return float(1 + mp.mpf(text.removeprefix("1")))
+    base = 2 if text.startswith("2") else 1
+    return float(base + mp.mpf(text.removeprefix(str(base))))
 
 
 def normal_inputs(name, dtype):
     """Yield regime, parameter and gamma of the normalized form at β = 0."""
     for gamma in in_type(GAMMAS.get(name, [2]), dtype):
-        extremes = OFF_AXIS if name in ("beckmann", "gauss", "smoothie") else []
+        unbounded = kind(name) == "alpha" and distribution(name).parameter.upper == np.inf
+        extremes = OFF_AXIS if unbounded else []
         values = [*USUAL[kind(name)], *MIRROR[kind(name)], *extremes]
         for parameter in in_type(values, dtype):
             yield "at the normal", parameter, gamma
     if name == "gtr":
-        for gamma, alpha in near_one(dtype):
+        for gamma, alpha in near(NEAR_ONE, NEARLY_UNIFORM, dtype):
             yield "γ near 1", alpha, gamma
 
 
@@ -157,7 +191,7 @@ def kernel_row(name, form, regime, parameter, gamma, beta, value, dtype):
         "form": form,
         "regime": regime,
         "parameter": short(parameter),
-        "gamma": short(gamma) if name == "gtr" else "",
+        "gamma": short(gamma) if name in GAMMAS else "",
         "beta": short(beta),
         "value": "0" if value < NOTHING else mp.nstr(value, DIGITS[dtype]),
     }
@@ -179,32 +213,51 @@ ENDS = {
     "schlick": [0.5, 0.9, 1],
     "sawicki": [0.1, 1, 10],
     "smoothie": [0.5, 2, 100],
+    "student-t": [0.5, 1, 3],
 }
 SMOOTH_ENDS = {"alpha": [1e-8, 1e-6, 1e-4], "exponent": [1e16, 1e12, 1e8]}
-GTR_GAMMA = 1.5
+# The γ of both sides, and the distributions of two parameters that take part: a number that is
+# legal and hard for one of them is illegal or Beckmann's for another.
+CONVERSION_GAMMAS = {1.5: ["gtr"], 4: ["student-t"]}
 
 
 def conversions():
-    """Yield a row for every method, source and value: the exact results in every target.
+    """Yield a row for every method, γ, source and value: the exact results in every target.
 
     The values are float32's, so that they are the same numbers in both types.
     """
     methods = {"closed-form": closed_form, "half-angle": half_angle, "peak": peak, "ward": ward}
-    for method, exact in methods.items():
-        for source in NAMES:
-            ends = {"mirror-smooth": SMOOTH_ENDS[kind(source)], "rough": ENDS[source]}
-            for regime, values in ends.items():
-                for value in map(np.float32, values):
-                    found = {t: exact(source, t, float(value)) for t in NAMES if t != source}
-                    if any(result is not None for result in found.values()):
-                        cells = {t: conversion_text(found.get(t)) for t in NAMES}
-                        yield {
-                            "method": method,
-                            "source": source,
-                            "regime": regime,
-                            "gamma": GTR_GAMMA,
-                            "value": short(value),
-                        } | cells
+    for number, gamma in enumerate(CONVERSION_GAMMAS):
+        for method, exact in methods.items():
+            for source in NAMES:
+                ends = {"mirror-smooth": SMOOTH_ENDS[kind(source)], "rough": ENDS[source]}
+                for regime, values in ends.items():
+                    for value in map(np.float32, values):
+                        row = conversion_row(exact, source, gamma, float(value), bool(number))
+                        if any(row.values()):
+                            yield {
+                                "method": method,
+                                "source": source,
+                                "regime": regime,
+                                "gamma": gamma,
+                                "value": short(value),
+                            } | row
+
+
+def conversion_row(exact, source, gamma, value, only_two):
+    """Return the exact results as text, empty where there is none.
+
+    A pair of distributions of one parameter is the same for every γ: with `only_two` it is left
+    out.
+    """
+    two = CONVERSION_GAMMAS[gamma]
+    row = dict.fromkeys(NAMES, "")
+    for target in NAMES:
+        second = [name for name in (source, target) if distribution(name).second_parameter]
+        known = all(name in two for name in second) and (second or not only_two)
+        if known and source != target:
+            row[target] = conversion_text(exact(source, target, value, gamma))
+    return row
 
 
 def conversion_text(value):
@@ -213,12 +266,12 @@ def conversion_text(value):
 
 def legal(target, value):
     """Return a result, or None where the target's legal range does not hold it."""
-    upper = 1 if target in ("ggx", "gtr", "schlick") else mp.inf
+    upper = mp.mpf(distribution(target).parameter.upper)
     return value if mp.im(value) == 0 and 0 < mp.re(value) <= upper else None
 
 
-def closed_form(source, target, value):
-    if "gtr" in (source, target):
+def closed_form(source, target, value, gamma):
+    if {source, target} & GAMMAS.keys():
         return None
     if source == "sawicki" and (mp.mpf(value) - mp.mpf("0.3")) / mp.mpf("1.174") <= 0:
         return None
@@ -229,7 +282,7 @@ def closed_form(source, target, value):
     return legal(target, result)
 
 
-def ward(source, target, value):
+def ward(source, target, value, gamma):
     names = {"beckmann": "m", "schlick": "m", "blinn-phong": "n"}
     if names.get(source, target) == names.get(target, source):
         same = {source, target} == {"beckmann", "schlick"}
@@ -240,21 +293,21 @@ def ward(source, target, value):
     return legal(target, two_over / value if names[source] == "m" else mp.sqrt(two_over))
 
 
-def half_angle(source, target, value):
-    beta_half = oracles.half_width(source, value, GTR_GAMMA)
-    return beta_half and oracles.from_half_width(target, beta_half, GTR_GAMMA)
+def half_angle(source, target, value, gamma):
+    beta_half = oracles.half_width(source, value, gamma)
+    return beta_half and oracles.from_half_width(target, beta_half, gamma)
 
 
-def peak(source, target, value):
+def peak(source, target, value, gamma):
     """Return the parameter with the same D(0)."""
-    at_normal = oracles.at_normal(source, value, GTR_GAMMA)
+    at_normal = oracles.at_normal(source, value, gamma)
     square = 1 / (mp.pi * at_normal)
     results = {
         "blinn-phong": lambda: 2 / square - 2,
         "sawicki": lambda: 8 / (3 * square) - 3,
         "smoothie": lambda: mp.sqrt(4 * square / (1 - square)) if square < 1 else mp.mpf(0),
-        "gauss": lambda: same_peak("gauss", at_normal),
-        "gtr": lambda: same_peak("gtr", at_normal),
+        "gauss": lambda: same_peak("gauss", at_normal, gamma),
+        "gtr": lambda: same_peak("gtr", at_normal, gamma),
     }
     # Every distribution is at least as high as one that is 1/π everywhere.
     if target in ("gauss", "gtr") and square >= 1:
@@ -262,12 +315,12 @@ def peak(source, target, value):
     return legal(target, results.get(target, lambda: mp.sqrt(square))())
 
 
-def same_peak(target, at_normal):
-    def excess(log_parameter):
-        return mp.log(oracles.at_normal(target, mp.exp(log_parameter), GTR_GAMMA) / at_normal)
+def same_peak(target, at_normal, gamma):
+    def difference(log_parameter):
+        return mp.log(oracles.at_normal(target, mp.exp(log_parameter), gamma) / at_normal)
 
     start = mp.log(1 / (mp.pi * at_normal)) / 2
-    return mp.exp(mp.findroot(excess, (start, start + mp.mpf("0.01"))))
+    return mp.exp(mp.findroot(difference, (start, start + mp.mpf("0.01"))))
 
 
 def write(name, rows):

@@ -30,7 +30,19 @@ def unit(name, beta, p, gamma=2):
         return 256 * c / ((1 - p) * c + p + 3) ** 4
     if name == "smoothie":
         return (p**2 / (p**2 + 4 * s**2)) ** 2
+    if name == "student-t":
+        return student_t(c, s, p, mp.mpf(float(gamma))) / maximum(name, p, float(gamma))
     raise KeyError(name)
+
+
+def student_t(c, s, p, gamma):
+    """Return D(β)/D(0) of Ribardière et al. 2017, from the printed normalized form."""
+
+    def printed(c, s):
+        bottom = mp.pi * c**4 * ((gamma - 1) * p**2 + (s / c) ** 2) ** gamma
+        return (gamma - 1) ** gamma * p ** (2 * gamma - 2) / bottom
+
+    return printed(c, s) / printed(mp.mpf(1), mp.mpf(0))
 
 
 def half_width(name, p, gamma=2):
@@ -40,7 +52,7 @@ def half_width(name, p, gamma=2):
     low, high = mp.mpf("1e-12"), HALF_PI * (1 - mp.mpf("1e-40"))
     if excess_mp(name, high, p, gamma) > 0:
         return None
-    for _ in range(220):
+    for _ in range(100):
         middle = mp.sqrt(low * high)
         if excess_mp(name, middle, p, gamma) > 0:
             low = middle
@@ -57,7 +69,7 @@ def from_half_width(name, beta_half, gamma=2):
     low_is_wide, high_is_wide = (excess_mp(name, beta_half, p, gamma) > 0 for p in (low, high))
     if high_is_wide != rising or low_is_wide == rising:
         return None
-    for _ in range(250):
+    for _ in range(110):
         middle = mp.sqrt(low * high)
         if (excess_mp(name, beta_half, middle, gamma) > 0) == rising:
             high = middle
@@ -67,7 +79,10 @@ def from_half_width(name, beta_half, gamma=2):
 
 
 EXPONENTS = ("blinn-phong", "sawicki")
-UPPER = {"beckmann": 100, "gauss": 100, "ggx": 1, "gtr": 1, "schlick": 1, "smoothie": 1e6}
+UPPER = {
+    "beckmann": 100, "gauss": 100, "ggx": 1, "gtr": 1, "schlick": 1, "smoothie": 1e6,
+    "student-t": 100,
+}  # fmt: skip
 
 
 def excess_mp(name, beta, p, gamma):
@@ -91,21 +106,40 @@ def ratio_mp(name, beta, p, gamma):
         ),
         "sawicki": lambda: 256 * c / ((1 - p) * c + p + 3) ** 4,
         "smoothie": lambda: (p**2 / (p**2 + 4 * s**2)) ** 2,
+        "student-t": lambda: student_t(c, s, p, mp.mpf(gamma)),
     }
     return ratio[name]()
 
 
-def maximum(name, p):
+def mode_square(name, p, gamma=2):
+    """Return tan²β of the maximum, 0 if that is at the normal."""
+    p, gamma = mp.mpf(p), mp.mpf(gamma)
+    if name == "beckmann":
+        return max(2 * p * p - 1, mp.mpf(0))
+    if name == "student-t":
+        above = 2 * (gamma - 1) * p * p - gamma
+        return mp.mpf(0) if above <= 0 else above / (gamma - 2) if gamma > 2 else mp.inf
+    return mp.mpf(0)
+
+
+def maximum(name, p, gamma=2):
     """Return max D(β)/D(0)."""
-    p = mp.mpf(p)
-    off_axis = name == "beckmann" and 2 * p * p > 1
-    return 4 * p**4 * mp.exp(1 / p**2 - 2) if off_axis else mp.mpf(1)
+    p, square = mp.mpf(p), mode_square(name, p, gamma)
+    if not square:
+        return mp.mpf(1)
+    if name == "beckmann":
+        return 4 * p**4 * mp.exp(1 / p**2 - 2)
+    # At γ = 2 it rises to α⁴ at the horizon.
+    if mp.isinf(square):
+        return p**4
+    c = 1 / mp.sqrt(1 + square)
+    return student_t(c, mp.sqrt(square) * c, p, mp.mpf(gamma))
 
 
 def at_normal(name, p, gamma=2):
     """Return D(0) of the normalized form; for the Gaussian by quadrature."""
     p, gamma = mp.mpf(p), mp.mpf(gamma)
-    if name in ("beckmann", "ggx", "schlick"):
+    if name in ("beckmann", "ggx", "schlick", "student-t"):
         return 1 / (mp.pi * p**2)
     if name == "gauss":
         ends = [step * p for step in (0, 1, 2, 4, 8, 12, 16) if step * p < HALF_PI]

@@ -34,14 +34,14 @@ def rows():
     """Yield a row for every pair and value: the best parameters under each metric."""
     for source, target in PAIRS:
         for value in EXPONENTS if source in oracles.EXPONENTS else ALPHAS:
-            given = np.float32(value)
-            found = {metric: best(metric, source, target, float(given)) for metric in METRICS}
+            single = np.float32(value)
+            results = {metric: best(metric, source, target, float(single)) for metric in METRICS}
             yield {
                 "source": source,
                 "target": target,
                 "regime": "mirror-smooth" if value in (ALPHAS[0], EXPONENTS[0]) else "usual",
-                "value": str(given).removesuffix(".0"),
-            } | {metric: mp.nstr(result, 20) for metric, result in found.items()}
+                "value": str(single).removesuffix(".0"),
+            } | {metric: mp.nstr(result, 20) for metric, result in results.items()}
 
 
 def best(metric, source, target, value):
@@ -66,17 +66,17 @@ def _imbalance(metric, source, value, target, log_parameter, order, width):
     """Return the distance at p(1+h) less that at p(1−h), over 2h."""
     scaled = [mp.exp(log_parameter + sign * STEP) for sign in (1, -1)]
     heights = [_height(metric, target, p) for p in scaled]
-    given = _height(metric, source, value)
+    height = _height(metric, source, value)
     total = mp.mpf(0)
     for beta, weight in _nodes(order, width):
         above, below = (
             h * oracles.ratio_mp(target, beta, p, 2) for h, p in zip(heights, scaled, strict=True)
         )
-        wanted = given * oracles.ratio_mp(source, beta, value, 2)
+        wanted = height * oracles.ratio_mp(source, beta, value, 2)
         if metric == "energy":
             weight = weight * mp.sin(2 * beta)
         total += weight * (above - below) * (above + below - 2 * wanted)
-    return total / (2 * STEP * given**2)
+    return total / (2 * STEP * height**2)
 
 
 def _height(metric, name, parameter):
@@ -91,11 +91,11 @@ def _nodes(order, width):
         edges.append(edges[-1] * _GROWTH)
     edges += [oracles.HALF_PI * (1 - mp.mpf(2) ** -k) for k in range(2, 9)] + [oracles.HALF_PI]
     edges = sorted(edges)
-    found = []
+    nodes = []
     for low, high in itertools.pairwise(edges):
         half, middle = (high - low) / 2, (high + low) / 2
-        found += [(middle + half * x, half * w) for x, w in _legendre(order)]
-    return found
+        nodes += [(middle + half * x, half * w) for x, w in _legendre(order)]
+    return nodes
 
 
 @functools.cache

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from typing import Any
 
 import numpy as np
 
-from mdfconv.benchmark.labels import place_labels
 from mdfconv.benchmark.measure import Measurements
 from mdfconv.benchmark.pareto import front
 from mdfconv.benchmark.timing import NOISE, Spread
-from mdfconv.reports.figures import encoded, line_style, pyplot
+from mdfconv.output.figures import encoded, line_style, pyplot
+from mdfconv.output.labels import place_labels
 
 _SIZE = (10.0, 5.6)  # inches
 _MARKERS = "osD^vPX*<>hp"
@@ -21,8 +22,11 @@ _FILLS = ("full", "none", "left", "top", "right", "bottom")
 _FRONTS = ("-", "--", ":", "-.")
 _COLORS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _ROUNDING = 1e-12  # smaller errors are none
-_BELOW = 0.1  # of the smallest error: where none is drawn
+# A decade below the smallest error is where none is drawn: apart from it, and still near.
+_BELOW = 0.1
+# An axis over a little more than two decades has too few powers of ten to be read between.
 _FEW_DECADES = 200
+# The labels beside the outermost points need as much more of the range at either end.
 _MARGIN = 0.06
 
 
@@ -34,18 +38,17 @@ class _Point:
     error: float
 
 
-def draw(found: Measurements, dpi: int = 120) -> bytes:
+def draw(measurements: Measurements, dpi: int = 120) -> bytes:
     """Return a PNG: error against time of distributions, and of conversion methods.
 
     Parameters
     ----------
-    found : Measurements
+    measurements : Measurements
         What was measured; a row without an error is left out.
     dpi : int
         Resolution.
     """
-    plt = pyplot()
-    figure, (left, right) = plt.subplots(1, 2, figsize=_SIZE)
+    figure, axes = pyplot().subplots(1, 2, figsize=_SIZE)
     distributions = [
         _Point(
             row.distribution,
@@ -53,29 +56,35 @@ def draw(found: Measurements, dpi: int = 120) -> bytes:
             row.ns["float32"],
             row.rmse,
         )
-        for row in found.substitutes
+        for row in measurements.substitutes
     ]
-    colors = {point.name: line_style(point.name)["color"] for point in distributions}
-    _panel(left, distributions, colors)
-    left.set_title("Distributions as substitutes")
-    left.set_xlabel("time of an evaluation, float32 [ns]")
-    left.set_ylabel("RMSE of the best fit, unit form")
     methods = [
         _Point(
             row.method, f"metric {row.metric}", _nanoseconds(row.per_second), row.parameter_error
         )
-        for row in found.methods
+        for row in measurements.methods
     ]
+    colors = {point.name: line_style(point.name)["color"] for point in distributions}
     names = dict.fromkeys(point.name for point in methods)
-    _panel(right, methods, dict(zip(names, _cycled(_COLORS, len(names)), strict=True)))
-    pair = found.methods[0]
-    right.set_title(f"Conversion methods, {pair.source} → {pair.target}")
-    right.set_xlabel("time of a conversion [ns]")
-    right.set_ylabel("median relative error of the parameter against fit")
+    panels = (
+        _Panel(axes[0], distributions, colors),
+        _Panel(axes[1], methods, dict(zip(names, cycle(_COLORS), strict=False))),
+    )
+    pair = measurements.methods[0]
+    axes[0].set(
+        title="Distributions as substitutes",
+        xlabel="time of an evaluation, float32 [ns]",
+        ylabel="RMSE of the best fit, unit form",
+    )
+    axes[1].set(
+        title=f"Conversion methods, {pair.source} → {pair.target}",
+        xlabel="time of a conversion [ns]",
+        ylabel="median relative error of the parameter against fit",
+    )
     # The layout decides how far apart the points are.
     figure.canvas.draw()
-    for axes, points in ((left, distributions), (right, methods)):
-        _label(axes, points)
+    for panel in panels:
+        panel.label()
     return encoded(figure, dpi=dpi)
 
 
@@ -84,90 +93,82 @@ def _nanoseconds(per_second: Spread) -> Spread:
     return Spread(median, high, low)
 
 
-def _panel(axes: Any, points: Sequence[_Point], colors: dict[str, str]) -> None:
-    """Draw points with their quartiles and fronts, and a legend beneath."""
-    there = [point for point in points if np.isfinite(point.error)]
-    nothing = _where_nothing_is(there)
-    names, variants = list(colors), list(dict.fromkeys(point.variant for point in there))
-    for number, variant in enumerate(variants):
-        own = [point for point in there if point.variant == variant]
-        _draw_front(axes, own, nothing, _FRONTS[number % len(_FRONTS)])
-        for point in own:
-            axes.errorbar(
-                point.nanoseconds.median,
-                max(point.error, nothing),
-                xerr=_bars(point.nanoseconds),
-                elinewidth=0.8,
-                **_style(names.index(point.name), number, colors[point.name]),
-            )
-    _scale(axes, nothing)
-    fills = [axes.plot([], [], **_style(0, number, "0.4"))[0] for number in range(len(variants))]
-    line = axes.plot([], [], color="0.55", linewidth=1.2)
-    axes.legend(
-        [*fills, *line],
-        [*variants, "Pareto front"],
-        loc="upper center",
-        bbox_to_anchor=(0.5, -0.12),
-        ncols=4,
-        fontsize=8,
-        columnspacing=1.2,
-        handletextpad=0.4,
-    )
+class _Panel:
+    """Points with their quartiles and fronts, and a legend beneath."""
 
+    def __init__(self, axes: Any, points: Sequence[_Point], colors: dict[str, str]) -> None:
+        self._axes = axes
+        self._points = [point for point in points if np.isfinite(point.error)]
+        errors = [point.error for point in self._points if point.error > _ROUNDING]
+        # The height at which an error of 0 is drawn.
+        self._zero = _BELOW * min(errors, default=1.0)
+        shapes = list(colors)
+        variants = list(dict.fromkeys(point.variant for point in self._points))
+        for fill, variant in enumerate(variants):
+            self._draw_front(variant, _FRONTS[fill % len(_FRONTS)])
+            for point in self._points:
+                if point.variant == variant:
+                    style = _style(shapes.index(point.name), fill, colors[point.name])
+                    self._draw_point(point, style)
+        self._scale()
+        self._draw_legend(variants)
 
-def _label(axes: Any, points: Sequence[_Point]) -> None:
-    there = [point for point in points if np.isfinite(point.error)]
-    nothing = _where_nothing_is(there)
-    place_labels(
-        axes,
-        [point.nanoseconds.median for point in there],
-        [max(point.error, nothing) for point in there],
-        [point.name for point in there],
-    )
+    def label(self) -> None:
+        """Write the names beside the points of a figure whose layout is final."""
+        x, y = zip(*map(self._position, self._points), strict=True)
+        place_labels(self._axes, x, y, [point.name for point in self._points])
 
+    def _position(self, point: _Point) -> tuple[float, float]:
+        return point.nanoseconds.median, max(point.error, self._zero)
 
-def _where_nothing_is(points: Sequence[_Point]) -> float:
-    """Return the height at which an error of 0 is drawn."""
-    errors = [point.error for point in points if point.error > _ROUNDING]
-    return _BELOW * min(errors, default=1.0)
+    def _draw_point(self, point: _Point, style: dict[str, Any]) -> None:
+        times = point.nanoseconds
+        bars = [[times.median - times.low], [times.high - times.median]]
+        self._axes.errorbar(*self._position(point), xerr=bars, elinewidth=0.8, **style)
 
+    def _draw_front(self, variant: str, dashes: str) -> None:
+        positions = [self._position(point) for point in self._points if point.variant == variant]
+        x, y = zip(*(positions[number] for number in front(positions, NOISE)), strict=True)
+        self._axes.step(x, y, where="post", color="0.55", linewidth=1.2, linestyle=dashes, zorder=1)
 
-def _scale(axes: Any, nothing: float) -> None:
-    """Set logarithmic axes with a 0 at the lower end, and ticks that can be read."""
-    # Not before `pyplot` has prepared Matplotlib.
-    from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
+    def _draw_legend(self, variants: Sequence[str]) -> None:
+        plot = self._axes.plot
+        fills = [plot([], [], **_style(0, fill, "0.4"))[0] for fill in range(len(variants))]
+        line = plot([], [], color="0.55", linewidth=1.2)
+        self._axes.legend(
+            [*fills, *line],
+            [*variants, "Pareto front"],
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.12),
+            ncols=4,
+            fontsize=8,
+            columnspacing=1.2,
+            handletextpad=0.4,
+        )
 
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.axhline(nothing, color="0.6", linewidth=0.8, linestyle=":")
-    axes.annotate(
-        "0", (0, nothing), xycoords=("axes fraction", "data"), xytext=(-6, 0),
-        textcoords="offset points", ha="right", va="center",
-    )  # fmt: skip
-    low, high = axes.get_xlim()
-    # Room for the labels.
-    margin = (high / low) ** _MARGIN
-    low, high = low / margin, high * margin
-    axes.set_xlim(low, high)
-    if high < _FEW_DECADES * low:
-        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
-        axes.xaxis.set_major_formatter("{x:g}")
-        axes.xaxis.set_minor_formatter(NullFormatter())
-    top = axes.get_ylim()[1]
-    axes.set_ylim(nothing / 3, 2 * top)
-    axes.set_yticks([tick for tick in axes.get_yticks() if 2 * nothing < tick < 2 * top])
-    axes.yaxis.set_minor_locator(NullLocator())
+    def _scale(self) -> None:
+        """Set logarithmic axes with a 0 at the lower end, and ticks that can be read."""
+        # Not before `pyplot` has prepared Matplotlib.
+        from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 
-
-def _draw_front(axes: Any, points: Sequence[_Point], nothing: float, dashes: str) -> None:
-    pairs = [(point.nanoseconds.median, max(point.error, nothing)) for point in points]
-    best = [pairs[place] for place in front(pairs, NOISE)]
-    x, y = zip(*best, strict=True)
-    axes.step(x, y, where="post", color="0.55", linewidth=1.2, linestyle=dashes, zorder=1)
-
-
-def _bars(times: Spread) -> list[list[float]]:
-    return [[times.median - times.low], [times.high - times.median]]
+        axes, zero = self._axes, self._zero
+        axes.set(xscale="log", yscale="log")
+        axes.axhline(zero, color="0.6", linewidth=0.8, linestyle=":")
+        axes.annotate(
+            "0", (0, zero), xycoords=("axes fraction", "data"), xytext=(-6, 0),
+            textcoords="offset points", ha="right", va="center",
+        )  # fmt: skip
+        low, high = axes.get_xlim()
+        margin = (high / low) ** _MARGIN
+        axes.set_xlim(low / margin, high * margin)
+        if high * margin < _FEW_DECADES * low / margin:
+            axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
+            axes.xaxis.set_major_formatter("{x:g}")
+            axes.xaxis.set_minor_formatter(NullFormatter())
+        top = 2 * axes.get_ylim()[1]
+        axes.set_ylim(zero / 3, top)
+        axes.set_yticks([tick for tick in axes.get_yticks() if 2 * zero < tick < top])
+        axes.yaxis.set_minor_locator(NullLocator())
 
 
 def _style(shape: int, fill: int, color: str) -> dict[str, Any]:
@@ -179,7 +180,3 @@ def _style(shape: int, fill: int, color: str) -> dict[str, Any]:
         "markersize": 7,
         "linestyle": "",
     }
-
-
-def _cycled(values: Sequence[str], count: int) -> list[str]:
-    return [values[number % len(values)] for number in range(count)]

@@ -9,15 +9,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from mdfconv.benchmark.stability_kernels import printed_form
 from mdfconv.benchmark.substitutes import PRECISIONS
-from mdfconv.benchmark.textbook import textbook
 from mdfconv.benchmark.timing import Advance, Sizes, Spread, interleave, spread
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 
-_ROUGHNESS, _EXPONENT = 0.2, 50.0
-
-_Step: TypeAlias = tuple[str, Callable[..., Any], Array]
+_Step: TypeAlias = tuple[Callable[..., Any], Array]
 
 
 @dataclass(frozen=True)
@@ -31,15 +29,14 @@ class KernelSpeed:
     parameter : float
         The parameter.
     functions : str
-        The transcendental functions of β that it cannot avoid; for a rational form the tangent
-        and a copy of it.
+        `Distribution.functions`, and a copy if there are fewer than two.
     kernel : Spread
         `Distribution.unit`.
     textbook : Spread
         The printed expression in NumPy.
     floor : Spread
-        Those functions alone, the first into a new array and the others in place, on the
-        arguments that the kernel gives them.
+        Those functions alone, the first into a new array and the others in place, on arguments
+        as the kernel gives them.
     copy : Spread
         Copying the array of β.
     speedup, over_floor, over_copy : float
@@ -83,11 +80,11 @@ def kernel_speeds(
     advance : callable
         Called with 1 after each of `count_steps` rounds.
     """
-    found = []
+    speeds = []
     for precision in PRECISIONS:
         beta = np.linspace(0, np.pi / 2, sizes.angles, dtype=precision)
-        found += [_measure(entry, beta, sizes, advance) for entry in candidates]
-    return found
+        speeds += [_speed(candidate, beta, sizes, advance) for candidate in candidates]
+    return speeds
 
 
 def count_steps(candidates: int, sizes: Sizes) -> int:
@@ -95,22 +92,23 @@ def count_steps(candidates: int, sizes: Sizes) -> int:
     return candidates * len(PRECISIONS) * (sizes.rounds + 1)
 
 
-def _measure(entry: Distribution, beta: Array, sizes: Sizes, advance: Advance) -> KernelSpeed:
-    parameter = _EXPONENT if entry.parameter.name == "exponent" else _ROUGHNESS
-    steps = _transcendentals(entry.name, beta, parameter)
+def _speed(candidate: Distribution, beta: Array, sizes: Sizes, advance: Advance) -> KernelSpeed:
+    parameter = candidate.parameter.typical_value
+    rounded = beta.dtype.type(parameter)
+    steps = _transcendentals(candidate, beta, parameter)
     functions: dict[str, Callable[[], object]] = {
-        "kernel": lambda: entry.unit(beta, parameter),
-        "textbook": lambda: textbook(entry.name, beta, parameter),
-        "floor": lambda: _run(steps),
+        "kernel": lambda: candidate.unit(beta, parameter),
+        "textbook": lambda: printed_form(candidate, "unit", beta, rounded),
+        "floor": lambda: _run(list(steps.values())),
         "copy": beta.copy,
     }
     times = interleave(functions, sizes.rounds, advance)
     kernel = times["kernel"]
     return KernelSpeed(
-        distribution=entry.name,
+        distribution=candidate.name,
         precision=beta.dtype.name,
         parameter=parameter,
-        functions=" ".join(name for name, *_ in steps),
+        functions=" ".join(steps),
         **{name: spread(1e9 * samples / beta.size) for name, samples in times.items()},
         speedup=float(np.median(times["textbook"] / kernel)),
         over_floor=float(np.median(kernel / times["floor"])),
@@ -119,22 +117,23 @@ def _measure(entry: Distribution, beta: Array, sizes: Sizes, advance: Advance) -
     )
 
 
-def _transcendentals(name: str, beta: Array, parameter: float) -> list[_Step]:
-    """Return the functions that a unit form cannot avoid, with their names and arguments."""
-    tangent: _Step = ("tan", np.tan, beta)
-    square = np.square(np.tan(beta))
-    if name in ("beckmann", "gauss"):
-        return [tangent, ("exp", np.exp, square / -(parameter**2))]
-    if name == "blinn-phong":
-        power = -0.5 * parameter * np.log1p(square)
-        return [tangent, ("log1p", np.log1p, square), ("exp", np.exp, power)]
-    return [tangent, ("copy", np.positive, beta)]
+def _transcendentals(candidate: Distribution, beta: Array, parameter: float) -> dict[str, _Step]:
+    """Return the functions that a unit form cannot avoid, with their arguments."""
+    # Of an exponential that underflows the logarithm of the smallest number will do.
+    unit = np.maximum(candidate.unit(beta, parameter), np.finfo(beta.dtype).tiny)
+    arguments = {"log1p": np.square(np.tan(beta)), "exp": np.log(unit)}
+    steps: dict[str, _Step] = {
+        name: (getattr(np, name), arguments.get(name, beta)) for name in candidate.functions
+    }
+    if len(steps) < 2:
+        steps["copy"] = np.positive, beta
+    return steps
 
 
 def _run(steps: list[_Step]) -> None:
-    (_, first, argument), *rest = steps
+    (first, argument), *rest = steps
     out = first(argument)
-    for _, function, argument in rest:
+    for function, argument in rest:
         function(argument, out=out)
 
 

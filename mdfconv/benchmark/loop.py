@@ -20,7 +20,7 @@ def curve_fit_loop(
     Parameters
     ----------
     source, target : Distribution
-        The distribution that is given and the one that takes its place.
+        The distribution that is replaced and the one that takes its place.
     parameter : numpy.ndarray, shape (n,)
         Legal parameters of the source.
     metric : Metric
@@ -35,14 +35,14 @@ def curve_fit_loop(
 
     beta, weight, wanted, peak = hemisphere(source, parameter, metric)
     starts = target.from_half_tangent(source.half_tangent(parameter))
-    found = np.full(parameter.size, np.nan)
+    results = np.full(parameter.size, np.nan)
     with np.errstate(all="ignore"), warnings.catch_warnings():
         # A perfect fit has no covariance to speak of.
         warnings.simplefilter("ignore", OptimizeWarning)
         for row in np.flatnonzero(~np.isnan(starts)).tolist():
 
             def signal(angle: Array, log_parameter: float, row: int = row) -> Array:
-                return metric.signal_of(target, angle, np.exp([log_parameter]), peak[row])
+                return metric.signal(target, angle, np.exp([log_parameter]), peak[row])
 
             try:
                 fitted, _ = curve_fit(
@@ -50,5 +50,5 @@ def curve_fit_loop(
                 )
             except RuntimeError:
                 continue
-            found[row] = np.exp(fitted[0])
-    return found
+            results[row] = np.exp(fitted[0])
+    return results

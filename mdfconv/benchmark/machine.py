@@ -13,13 +13,13 @@ _CPU_INFO = Path("/proc/cpuinfo")
 
 
 def describe() -> dict[str, str]:
-    """Return processor, its vector extensions as NumPy found them, system and versions."""
+    """Return processor, its vector extensions as NumPy uses them, system and versions."""
     config = np.show_config(mode="dicts")
-    found = config.get("SIMD Extensions", {}).get("found", []) if config else []
+    extensions = config.get("SIMD Extensions", {}).get("found", []) if config else []
     return {
         "cpu": _cpu_model(),
         "cpus": str(os.cpu_count()),
-        "vector_extensions": " ".join(found) or "none beyond NumPy's baseline",
+        "vector_extensions": " ".join(extensions) or "none beyond NumPy's baseline",
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         "numpy": np.__version__,

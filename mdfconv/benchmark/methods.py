@@ -7,21 +7,22 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mdfconv.benchmark.loop import curve_fit_loop
 from mdfconv.benchmark.timing import Advance, Sizes, Spread, clock, interleave, spread
-from mdfconv.conversion import find_method, list_methods
-from mdfconv.conversion.endpoint import same_family
+from mdfconv.conversion import list_methods, method_named
 from mdfconv.conversion.method import Method
-from mdfconv.conversion.residual import residual
+from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.metrics import Metric, list_metrics
-from mdfconv.fitting.metrics import metric as find_metric
-from mdfconv.reports.table2 import paper_sweep
+from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
+from mdfconv.paper.table2 import paper_sweep
 
 LOOP = "curve_fit"
+# The paper's sweep, and every range of widths here, is one of this distribution's m_B.
+_PAPER_SOURCE = "beckmann"
 _PATIENCE = 1.0  # seconds for the many values of `Sizes.conversions`
 
 _Convert: TypeAlias = Callable[[Array], Array]
@@ -102,11 +103,29 @@ def answers(
         return np.where(target.parameter.accepts(result), result, np.nan)
 
 
+def as_wide(m_b: ArrayLike, source: Distribution) -> Array:
+    """Return the parameters of lobes as wide at half height as Beckmann's at m_B.
+
+    Parameters
+    ----------
+    m_b : array_like, shape (n,)
+        Beckmann's parameters.
+    source : Distribution
+        The distribution.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        NaN where the distribution has no such lobe.
+    """
+    tangents = distribution(_PAPER_SOURCE).half_tangent(m_b)
+    return np.asarray(source.from_half_tangent(tangents))
+
+
 def sweep(source: Distribution, count: int) -> Array:
-    """Return parameters for lobes as wide as those of the paper's sweep of Beckmann's m_B."""
-    m_b = np.sort(paper_sweep()[0])[[0, -1]]
-    tangents = distribution("beckmann").half_tangent(m_b)
-    low, high = source.from_half_tangent(tangents).tolist()
+    """Return parameters for lobes as wide as those of the paper's sweep, evenly in logarithm."""
+    m_b, _ = paper_sweep()
+    low, high = as_wide([m_b.min(), m_b.max()], source).tolist()
     return np.geomspace(low, high, count)
 
 
@@ -129,10 +148,10 @@ def method_speeds(
     MdfconvError
         If there is nothing to convert between the two.
     """
-    if same_family(source, target):
+    if source.is_same(target):
         raise MdfconvError(f"from {source.name} to {target.name} there is nothing to convert")
     trials = _trials(source, target, sizes)
-    functions = {str(place): trial.run(source) for place, trial in enumerate(trials)}
+    functions = {str(number): trial.run(source) for number, trial in enumerate(trials)}
     times = interleave(functions, sizes.rounds, advance)
     return [
         _speed(source, target, trial, sizes, samples)
@@ -155,21 +174,17 @@ class _Trial:
 
 
 def _trials(source: Distribution, target: Distribution, sizes: Sizes) -> list[_Trial]:
-    first, *others = (find_metric(name) for name in list_metrics())
-    pairs = [(method, first) for method in covering(source, target, first)]
-    pairs += [
-        (method, metric)
-        for metric in others
-        for method in covering(source, target, metric)
-        if method.follows_metric
-    ]
-    found = []
-    for method, metric in pairs:
-        convert = _by_method(method, source, target, metric)
-        found.append(_Trial(method.name, metric, convert, _size(convert, source, sizes)))
-    for metric in (first, *others):
-        found.append(_Trial(LOOP, metric, _by_loop(source, target, metric), sizes.loop))
-    return found
+    """Return the trials: a method that follows no metric once, under the first one."""
+    metrics = [metric_named(name) for name in list_metrics()]
+    trials = []
+    for metric in metrics:
+        for method in covering(source, target, metric):
+            if method.follows_metric or metric is metrics[0]:
+                convert = _by_method(method, source, target, metric)
+                trials.append(_Trial(method.name, metric, convert, _size(convert, source, sizes)))
+    for metric in metrics:
+        trials.append(_Trial(LOOP, metric, _by_loop(source, target, metric), sizes.loop))
+    return trials
 
 
 def _by_method(
@@ -197,23 +212,22 @@ def _speed(
 ) -> MethodSpeed:
     parameter = sweep(source, min(trial.values, sizes.fits))
     result = trial.convert(parameter)
-    best = answers(find_method("fit"), parameter, source, target, trial.metric)
-    there = ~np.isnan(result) & ~np.isnan(best)
-    given, got = parameter[there], result[there]
-    off = np.abs(got / best[there] - 1)
-    rmse, _ = residual(source, given, target, got, trial.metric)
+    best = answers(method_named("fit"), parameter, source, target, trial.metric)
+    answered = ~np.isnan(result) & ~np.isnan(best)
+    off = np.abs(result[answered] / best[answered] - 1)
+    rmse, _ = remaining_error(source, parameter[answered], target, result[answered], trial.metric)
     return MethodSpeed(
         source=source.name,
         target=target.name,
         method=trial.method,
-        metric=trial.metric.name,
+        metric=str(trial.metric),
         values=trial.values,
         per_second=spread(trial.values / samples),
         parameter_error=_summary(np.median, off),
         parameter_error_max=_summary(np.max, off),
         rmse=_summary(np.median, rmse),
         rmse_max=_summary(np.max, rmse),
-        answered=float(np.mean(there)),
+        answered=float(np.mean(answered)),
     )
 
 

@@ -34,7 +34,7 @@ def normalizer_speeds(exponent: float) -> list[dict[str, Any]]:
     MdfconvError
         If the exponent is negative.
     """
-    names = [name for name in NORMALIZERS if name != "arvo" or exponent == round(exponent)]
+    names = [name for name in NORMALIZERS.names if name != "arvo" or exponent == round(exponent)]
     models = {name: furnace_model("modified-phong", exponent, normalizer=name) for name in names}
     times = interleave(
         {name: _evaluation(name, exponent) for name in names}, _ROUNDS, lambda steps: None

@@ -7,7 +7,7 @@ from typing import Any
 from mdfconv.benchmark import verdicts
 from mdfconv.benchmark.measure import Measurements
 from mdfconv.benchmark.timing import Spread
-from mdfconv.reports.text import Record, markdown_text
+from mdfconv.output.records import markdown_text
 
 TITLES = {
     "substitutes": "Distributions as substitutes",
@@ -20,19 +20,18 @@ _LEGENDS = {
     "10. RMSE and max error: of the best fit to the unit form, relative to its peak, on β from 0 "
     "to 4.8 β_half. energy error: of the best fit to the normalized form, "
     "√(∫ (D − D_ref)² cos β dω / ∫ D_ref² cos β dω).",
-    "methods": "Over lobes as wide as Beckmann's in the paper's sweep, m_B from 0.0045 to 0.45. "
+    "methods": "Over lobes as wide as those of the paper's sweep. "
     "parameter error: |p/p_fit − 1|, median and maximum, against the best fit under the metric. "
     "RMSE: what the conversion leaves, under the metric and relative to the source's peak. "
-    "curve_fit: "
-    "scipy.optimize.curve_fit called once a value, on the samples and weights that fit uses, "
-    "from equal half angles.",
+    "curve_fit: scipy.optimize.curve_fit called once a value, on the samples and weights that fit "
+    "uses, from equal half angles.",
     "kernels": "ns: time to evaluate the unit form at one angle. textbook: the printed "
     "expression in NumPy. functions: the transcendental functions that the form cannot avoid, "
-    "or a tangent and a copy, timed alone on whole arrays. copy: copying the array of β. ×: the "
-    "kernel's time over that of the textbook, of those functions, of the copy; medians over "
-    "rounds. memory: peak of newly allocated memory over the size of the result. The angles "
-    "rise: beyond the end of Schlick's lobe whole blocks are skipped; in random order it takes "
-    "two to three times as long.",
+    "with a copy where there are fewer than two, timed alone on whole arrays. copy: copying the "
+    "array of β. ×: the kernel's time over that of the textbook, of those functions, of the copy; "
+    "medians over rounds. memory: peak of newly allocated memory over the size of the result. The "
+    "angles rise: beyond the end of Schlick's lobe whole blocks are skipped; in random order it "
+    "takes longer.",
 }
 _CHOOSING = """\
 ## Choosing
@@ -48,7 +47,7 @@ they do not know, use `fast` or `fit`.
 - Times depend on the processor and on NumPy; run `mdfconv bench` where the code will run."""
 
 
-def tables(found: Measurements) -> dict[str, list[dict[str, Any]]]:
+def tables(measurements: Measurements) -> dict[str, list[dict[str, Any]]]:
     """Return the three tables with rounded cells, a median with its quartiles in one."""
     return {
         "substitutes": [
@@ -63,7 +62,7 @@ def tables(found: Measurements) -> dict[str, list[dict[str, Any]]]:
                 "max error": _rounded(row.max_error),
                 "energy error": _rounded(row.energy_error),
             }
-            for row in found.substitutes
+            for row in measurements.substitutes
         ],
         "methods": [
             {
@@ -77,7 +76,7 @@ def tables(found: Measurements) -> dict[str, list[dict[str, Any]]]:
                 "largest RMSE": _rounded(row.rmse_max),
                 "answered": f"{100 * row.answered:.3g} %",
             }
-            for row in found.methods
+            for row in measurements.methods
         ],
         "kernels": [
             {
@@ -93,60 +92,59 @@ def tables(found: Measurements) -> dict[str, list[dict[str, Any]]]:
                 "× copy": _rounded(row.over_copy),
                 "memory": _rounded(row.memory),
             }
-            for row in found.kernels
+            for row in measurements.kernels
         ],
     }
 
 
-def title(found: Measurements, name: str) -> str:
+def title(measurements: Measurements, name: str) -> str:
     """Return the heading of a table."""
-    pair = f", {found.methods[0].source} → {found.methods[0].target}" if name == "methods" else ""
-    return TITLES[name] + pair
+    if name != "methods":
+        return TITLES[name]
+    pair = measurements.methods[0]
+    return f"{TITLES[name]}, {pair.source} → {pair.target}"
 
 
-def sentences(found: Measurements) -> dict[str, list[str]]:
+def sentences(measurements: Measurements) -> dict[str, list[str]]:
     """Return what each table says."""
     return {
-        "substitutes": verdicts.on_substitutes(found),
-        "methods": verdicts.on_methods(found),
-        "kernels": verdicts.on_kernels(found),
+        "substitutes": verdicts.on_substitutes(measurements),
+        "methods": verdicts.on_methods(measurements),
+        "kernels": verdicts.on_kernels(measurements),
     }
 
 
-def markdown_page(found: Measurements, picture: str | None = None) -> str:
+def markdown_page(measurements: Measurements, picture: str | None = None) -> str:
     """Return the measurements as a Markdown page.
 
     Parameters
     ----------
-    found : Measurements
+    measurements : Measurements
         What was measured.
     picture : str, optional
         The name of the picture's file, which the page then shows.
     """
-    lines = ["# Speed against error", "", *_machine(found), ""]
+    lines = ["# Speed against error", "", _machine(measurements), ""]
     if picture:
         lines += [f"![Error against time, distributions and methods]({picture})", ""]
-    said = sentences(found)
-    for name, rows in tables(found).items():
-        lines += [f"## {title(found, name)}", "", _LEGENDS[name], ""]
-        lines += [_table(rows), "", *(f"- {sentence}" for sentence in said[name]), ""]
+    said = sentences(measurements)
+    for name, rows in tables(measurements).items():
+        lines += [f"## {title(measurements, name)}", "", _LEGENDS[name], ""]
+        lines += [markdown_text(list(rows[0]), rows), ""]
+        lines += [*(f"- {sentence}" for sentence in said[name]), ""]
     return "\n".join([*lines, _CHOOSING])
 
 
-def _machine(found: Measurements) -> list[str]:
-    what, sizes = found.machine, found.sizes
-    return [
-        f"Measured on {what['cpu']} ({what['cpus']} CPUs, {what['vector_extensions']}), "
-        f"{what['system']}, Python {what['python']}, NumPy {what['numpy']}, SciPy {what['scipy']}. "
+def _machine(measurements: Measurements) -> str:
+    machine, sizes = measurements.machine, measurements.sizes
+    return (
+        f"Measured on {machine['cpu']} ({machine['cpus']} CPUs, {machine['vector_extensions']}), "
+        f"{machine['system']}, Python {machine['python']}, NumPy {machine['numpy']}, "
+        f"SciPy {machine['scipy']}. "
         f"Medians of {sizes.rounds} interleaved rounds after a warm-up, quartiles in parentheses; "
         f"evaluations on {sizes.angles:,} angles from 0 to π/2; processor time of one thread. "
         "Made by `mdfconv bench --format markdown`."
-    ]
-
-
-def _table(rows: list[dict[str, Any]]) -> str:
-    table: list[Record] = list(rows)
-    return markdown_text(list(rows[0]), table)
+    )
 
 
 def _rounded(value: float, digits: int = 3) -> float:

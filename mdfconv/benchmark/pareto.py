@@ -18,7 +18,7 @@ def front(points: Sequence[tuple[float, float]], tie: float = 0.0) -> list[int]:
     Returns
     -------
     list of int
-        Places of the points than which no other is better in one cost and at least as good in
+        Indices of the points than which no other is better in one cost and at least as good in
         the other; of equal points the first.
 
     Examples
@@ -26,13 +26,13 @@ def front(points: Sequence[tuple[float, float]], tie: float = 0.0) -> list[int]:
     >>> front([(3.0, 0.0), (1.0, 0.2), (2.0, 0.3), (1.0, 0.2)])
     [1, 0]
     """
-    found: list[int] = []
+    kept: list[int] = []
     lowest = float("inf")
-    places = [place for place, point in enumerate(points) if point[0] == point[0]]
-    for place in sorted(places, key=lambda place: points[place]):
-        if points[place][1] < lowest:
-            lowest = points[place][1]
-            while found and points[place][0] <= (1 + tie) * points[found[-1]][0]:
-                found.pop()
-            found.append(place)
-    return found
+    comparable = [index for index, point in enumerate(points) if point[0] == point[0]]
+    for index in sorted(comparable, key=lambda index: points[index]):
+        if points[index][1] < lowest:
+            lowest = points[index][1]
+            while kept and points[index][0] <= (1 + tie) * points[kept[-1]][0]:
+                kept.pop()
+            kept.append(index)
+    return kept

@@ -11,9 +11,8 @@ import numpy as np
 from mdfconv.benchmark.methods import answers, covering
 from mdfconv.benchmark.substitutes import best, evaluation_times
 from mdfconv.benchmark.timing import NOISE, interleave, spread
-from mdfconv.conversion.endpoint import same_family
 from mdfconv.conversion.method import Method
-from mdfconv.conversion.residual import residual
+from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
@@ -80,9 +79,12 @@ class Recommendation:
     def records(self) -> list[dict[str, Any]]:
         """Return the candidates as rows of a table, the chosen one first."""
         return [
-            vars(entry)
-            | {"within": entry.max_error <= self.tolerance, "chosen": entry is self.chosen}
-            for entry in (self.chosen, *self.others)
+            vars(candidate)
+            | {
+                "within": candidate.max_error <= self.tolerance,
+                "chosen": candidate is self.chosen,
+            }
+            for candidate in (self.chosen, *self.others)
         ]
 
 
@@ -103,12 +105,11 @@ def recommend(
     Parameters
     ----------
     source : Distribution
-        What the surface is given in; it is a candidate without an error, so there is always an
-        answer.
+        That of the surface; it is a candidate without an error, so there is always an answer.
     parameter : float
         Its parameter.
     distributions : sequence of Distribution
-        The candidates.
+        The candidates, the source among them by its name.
     metric : Metric
         Under which errors are taken.
     tolerance : float
@@ -121,16 +122,17 @@ def recommend(
     """
     if not 0 < tolerance < np.inf:
         raise MdfconvError(f"a tolerance is a number above 0, not {tolerance:g}")
-    given = np.array([parameter])
-    candidates = _measure(source, given, distributions, metric)
-    found = choose(candidates, tolerance)
-    chosen = found
-    if found.method != NOT_CONVERTED:
-        target = next(entry for entry in distributions if entry.name == found.distribution)
-        chosen = _convert(source, given, target, metric, found, tolerance)
+    surface = np.array([parameter])
+    targets = {target.name: target for target in distributions} | {source.name: source}
+    candidates = _timed_fits(source, surface, list(targets.values()), metric)
+    cheapest = choose(candidates, tolerance)
+    chosen = cheapest
+    if cheapest.method != NOT_CONVERTED:
+        target = targets[cheapest.distribution]
+        chosen = _cheapest_conversion(source, surface, target, metric, cheapest, tolerance)
     others = sorted(
-        (entry for entry in candidates if entry is not found),
-        key=lambda entry: (entry.max_error > tolerance, entry.ns),
+        (candidate for candidate in candidates if candidate is not cheapest),
+        key=lambda candidate: (candidate.max_error > tolerance, candidate.ns),
     )
     return Recommendation(
         chosen, tuple(others), tolerance, _reason(chosen, candidates, source.name, tolerance)
@@ -152,78 +154,80 @@ def choose(candidates: Sequence[Candidate], tolerance: float) -> Candidate:
 
 def _quickest(candidates: Sequence[Candidate], tolerance: float) -> list[Candidate]:
     """Return those within the tolerance that are as quick as the quickest but for noise."""
-    within = [entry for entry in candidates if entry.max_error <= tolerance]
-    least = min(entry.ns for entry in within)
-    return [entry for entry in within if entry.ns <= (1 + NOISE) * least]
+    within = [candidate for candidate in candidates if candidate.max_error <= tolerance]
+    least = min(candidate.ns for candidate in within)
+    return [candidate for candidate in within if candidate.ns <= (1 + NOISE) * least]
 
 
-def _measure(
-    source: Distribution, given: Array, distributions: Sequence[Distribution], metric: Metric
+def _timed_fits(
+    source: Distribution, surface: Array, targets: Sequence[Distribution], metric: Metric
 ) -> list[Candidate]:
     """Return every distribution that has a best fit, timed."""
-    fits = [(entry, *best(source, given, entry, metric)) for entry in distributions]
-    there = [fit for fit in fits if not np.isnan(fit[1][0])]
-    pairs = [(entry, float(parameter[0])) for entry, parameter, *_ in there]
-    times = evaluation_times(pairs, "float32", _ANGLES, _ROUNDS)
+    fits = [(target, *best(source, surface, target, metric)) for target in targets]
+    fits = [fit for fit in fits if not np.isnan(fit[1][0])]
+    lobes = [(target, float(parameter[0])) for target, parameter, *_ in fits]
+    times = evaluation_times(lobes, "float32", _ANGLES, _ROUNDS)
     return [
         Candidate(
-            entry.name,
+            target.name,
             float(parameter[0]),
-            NOT_CONVERTED if same_family(source, entry) else "fit",
+            NOT_CONVERTED if source.is_same(target) else "fit",
             time.median,
-            entry.operations,
+            target.operations,
             float(rmse[0]),
             float(max_error[0]),
         )
-        for (entry, parameter, rmse, max_error), time in zip(there, times, strict=True)
+        for (target, parameter, rmse, max_error), time in zip(fits, times, strict=True)
     ]
 
 
-def _convert(
+def _cheapest_conversion(
     source: Distribution,
-    given: Array,
+    surface: Array,
     target: Distribution,
     metric: Metric,
     candidate: Candidate,
     tolerance: float,
 ) -> Candidate:
     """Return a candidate by the cheapest method that keeps it within the tolerance."""
-    found: dict[str, Candidate] = {}
+    conversions: dict[str, Candidate] = {}
     runs: dict[str, Callable[[], object]] = {}
     for method in covering(source, target, metric):
-        result = answers(method, given, source, target, metric)
+        result = answers(method, surface, source, target, metric)
         if np.isnan(result[0]):
             continue
-        rmse, max_error = (float(e[0]) for e in residual(source, given, target, result, metric))
+        rmse, max_error = (
+            float(error[0]) for error in remaining_error(source, surface, target, result, metric)
+        )
         if max_error <= tolerance:
-            found[method.name] = replace(
+            conversions[method.name] = replace(
                 candidate,
                 parameter=float(result[0]),
                 method=method.name,
                 rmse=rmse,
                 max_error=max_error,
             )
-            runs[method.name] = _conversion(method, given, source, target, metric)
+            runs[method.name] = _conversion(method, surface, source, target, metric)
     times = {name: spread(t).median for name, t in interleave(runs, 3, lambda steps: None).items()}
     quick = [name for name, time in times.items() if time <= _SAME_COST * min(times.values())]
-    return found[min(quick, key=lambda name: found[name].max_error)]
+    return conversions[min(quick, key=lambda name: conversions[name].max_error)]
 
 
 def _conversion(
-    method: Method, given: Array, source: Distribution, target: Distribution, metric: Metric
+    method: Method, surface: Array, source: Distribution, target: Distribution, metric: Metric
 ) -> Callable[[], object]:
-    return lambda: answers(method, given, source, target, metric)
+    return lambda: answers(method, surface, source, target, metric)
 
 
 def _reason(
     chosen: Candidate, candidates: Sequence[Candidate], source: str, tolerance: float
 ) -> str:
-    own = next(entry for entry in candidates if entry.method == NOT_CONVERTED)
-    count = sum(entry.max_error <= tolerance for entry in candidates)
+    own = next(candidate for candidate in candidates if candidate.method == NOT_CONVERTED)
+    count = sum(candidate.max_error <= tolerance for candidate in candidates)
     rivals = [
-        entry.distribution
-        for entry in _quickest(candidates, tolerance)
-        if entry.distribution != chosen.distribution
+        candidate.distribution
+        for candidate in _quickest(candidates, tolerance)
+        if candidate.distribution != chosen.distribution
     ]
     tie = f" ({' and '.join(rivals)} as quick, but for noise)" if rivals else ""
     if count == 1:

@@ -37,7 +37,7 @@ def hemisphere(
     tangent = source.half_tangent(parameter)
     width = np.arctan(np.where(tangent < _WIDEST_TANGENT, tangent, _WIDEST_TANGENT))
     beta, weight = LobeQuadrature(width).nodes(np.arange(parameter.size))
-    given = parameter[:, None]
-    peak = source.maximum(given, normalized=metric.normalized)
-    signal = metric.signal_of(source, beta, given, peak)
+    column = parameter[:, None]
+    peak = source.maximum(column, normalized=metric.normalized)
+    signal = metric.signal(source, beta, column, peak)
     return beta, weight * metric.weight(beta), signal, peak

@@ -31,7 +31,7 @@ def audit(names: Sequence[str] = (), part: str | None = None) -> Iterator[Findin
     ------
     Finding
         First of the kernels (float64, float32, float16), then of the conversions (float64,
-        float32).
+        float32). A distribution without stored references has a finding without cases.
 
     Raises
     ------

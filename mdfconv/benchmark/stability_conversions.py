@@ -10,42 +10,47 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.benchmark.stability_finding import Finding, Tally, read_rows
-from mdfconv.benchmark.stability_textbook import printed_conversion
+from mdfconv.benchmark.stability_finding import Finding, Tallies, read_rows
 from mdfconv.conversion import convert, list_methods
+from mdfconv.conversion.endpoint import Endpoint
+from mdfconv.conversion.equivalence import exact_route
 from mdfconv.conversion.formulas import FormulaMethod
 from mdfconv.conversion.method import Method
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
-from mdfconv.fitting.metrics import metric
+from mdfconv.fitting.metrics import metric_named
 
 # The computation is in float64 throughout: float32 rounds the input and the result.
 _DTYPES = (np.float64, np.float32)
-# Methods that answer with the best fit.
-_BEST_FITS = ("fit", "fast")
+# What the stored fits keep.
 _FIT_METRICS = ("unit", "energy")
-# Methods of which one direction undoes the other, for every pair.
-_INVERTIBLE = ("half-angle", "peak")
+# Methods of which one direction undoes the other, for every pair, with the printed expressions
+# that they go through.
+_INVERTIBLE = {"half-angle": ("cosine", "from_cosine"), "peak": ("peak_alpha", "from_peak_alpha")}
 _ENCODED = {"mirror-smooth": ("1e-08", "1e-06", "1e-04"), "rough": ("0.25", "0.5", "1")}
+
+# Columns of conversions.csv that are not a target's.
+_KEYS = ("method", "source", "regime", "gamma", "value")
+
+_Rows = list[dict[str, str]]
 
 
 @dataclass(frozen=True)
 class _Batch:
     """Values at one end of the source's range, float32's, and their exact results in a target."""
 
-    source: str
-    target: str
+    source: Distribution
+    target: Distribution
     regime: str
-    gamma: float
     values: list[str]
     exact: list[Decimal]
 
-    def given(self, dtype: Any) -> Array:
+    def of_type(self, dtype: Any) -> Array:
         return np.array(self.values, dtype=np.float32).astype(dtype)
 
     @property
-    def places(self) -> list[str]:
-        return [f"{value} → {self.target}" for value in self.values]
+    def cases(self) -> list[str]:
+        return [f"{value} → {self.target.name}" for value in self.values]
 
 
 def audit_conversions(chosen: Sequence[Distribution]) -> Iterator[Finding]:
@@ -63,123 +68,127 @@ def audit_conversions(chosen: Sequence[Distribution]) -> Iterator[Finding]:
         where it started: where a conversion is nearly constant, no stored result leads back.
     """
     formulas, fits = read_rows("conversions.csv"), read_rows("fits.csv")
-    known = {row["method"] for row in formulas}
-    for entry in chosen:
+    for source in chosen:
+        fitted = [row for row in fits if row["source"] == source.name]
         for method in list_methods():
-            if method.name in known:
-                rows = [row for row in formulas if row["method"] == method.name]
-                yield from _formula(method, _formula_batches(rows, entry))
-            elif method.name in _BEST_FITS:
-                yield from _fits(method, fits, entry)
-        yield from _encodings(entry)
+            rows = [
+                row
+                for row in formulas
+                if (row["method"], row["source"]) == (method.name, source.name)
+            ]
+            yield from _formula(method, _formula_batches(source, rows))
+            if method.follows_metric:
+                yield from _fits(method, source, fitted)
+        yield from _encodings(source)
 
 
-def _formula_batches(rows: list[dict[str, str]], entry: Distribution) -> Iterator[_Batch]:
-    mine = [row for row in rows if row["source"] == entry.name]
-    for regime, group in groupby(mine, lambda row: row["regime"]):
+def _formula_batches(source: Distribution, rows: _Rows) -> Iterator[_Batch]:
+    for (regime, gamma), group in groupby(rows, lambda row: (row["regime"], row["gamma"])):
         members = list(group)
-        for target in _names(members[0]):
-            found = [row for row in members if row[target]]
-            if found:
+        for name in [column for column in members[0] if column not in _KEYS]:
+            answered = [row for row in members if row[name]]
+            if answered:
                 yield _Batch(
-                    entry.name,
-                    target,
+                    _with_gamma(source, gamma),
+                    _with_gamma(distribution(name), gamma),
                     regime,
-                    float(found[0]["gamma"]),
-                    [row["value"] for row in found],
-                    [Decimal(row[target]) for row in found],
+                    [row["value"] for row in answered],
+                    [Decimal(row[name]) for row in answered],
                 )
 
 
-def _names(row: dict[str, str]) -> list[str]:
-    return [name for name in row if name not in ("method", "source", "regime", "gamma", "value")]
+def _with_gamma(end: Distribution, gamma: str) -> Distribution:
+    return end.with_gamma(float(gamma)) if end.second_parameter else end
 
 
 def _formula(method: Method, batches: Iterator[_Batch]) -> Iterator[Finding]:
-    there, back = _Tallies(), _Tallies()
+    forward, back = Tallies(), Tallies()
     for batch in batches:
         source, target = batch.source, batch.target
-        sides = distribution(source), distribution(target)
-        comes_back = method.name in _INVERTIBLE or method.is_exact(*sides)
+        comes_back = method.name in _INVERTIBLE or exact_route(source, target) is not None
         for dtype in _DTYPES:
-            given = batch.given(dtype)
-            ours = convert(given, source, target, method.name, gamma=batch.gamma)
-            printed = _printed(method, source, target, given, batch.gamma)
-            there.of(source, method.name, batch.regime, dtype).add(
-                ours, printed, batch.exact, batch.places
+            values = batch.of_type(dtype)
+            ours = convert(values, Endpoint(source), Endpoint(target), method.name)
+            printed = printed_conversion(method, source, target, values)
+            group = batch.regime, dtype
+            forward.of(source.name, method.name, *group).add(
+                ours, printed, batch.exact, batch.cases
             )
             if comes_back:
                 if printed is not None:
-                    printed = _printed(method, target, source, printed, batch.gamma)
-                back.of(source, f"{method.name} and back", batch.regime, dtype).add(
-                    convert(ours, target, source, method.name, gamma=batch.gamma),
+                    printed = printed_conversion(method, target, source, printed)
+                back.of(source.name, f"{method.name} and back", *group).add(
+                    convert(ours, Endpoint(target), Endpoint(source), method.name),
                     printed,
-                    [Decimal(float(value)) for value in given],
-                    [f"{place} → {source}" for place in batch.places],
+                    [Decimal(float(value)) for value in values],
+                    [f"{case} → {source.name}" for case in batch.cases],
                 )
-    yield from there.findings()
+    yield from forward.findings()
     yield from back.findings()
 
 
-def _printed(method: Method, source: str, target: str, given: Array, gamma: float) -> Array | None:
-    """Return what the printed formula gives in the type of the value, None if there is none."""
-    if isinstance(method, FormulaMethod):
-        # It holds the formulas as printed.
-        sides = distribution(source), distribution(target)
-        with np.errstate(all="ignore"):
-            return method.convert(given, *sides, metric("unit")).astype(given.dtype)
-    exponent = np.full_like(given, gamma)
-    found: Array | None = printed_conversion(method.name, source, target, given, exponent)
-    return found
+def printed_conversion(
+    method: Method, source: Distribution, target: Distribution, values: Array
+) -> Array | None:
+    """Return what the printed formulas give in the type of the values; None if none is printed.
+
+    Parameters
+    ----------
+    method : Method
+        The method.
+    source, target : Distribution
+        The pair, with their γ.
+    values : numpy.ndarray
+        Parameters of the source.
+    """
+    with np.errstate(all="ignore"):
+        if isinstance(method, FormulaMethod):
+            # It holds the formulas as printed.
+            result = method.convert(values, source, target, metric_named("unit"))
+        else:
+            first, last = (
+                getattr(end.printed, name)
+                for end, name in zip((source, target), _INVERTIBLE[method.name], strict=True)
+            )
+            if first is None or last is None:
+                return None
+            result = last(first(values, *_gammas(source, values)), *_gammas(target, values))
+    return np.asarray(result).astype(values.dtype)
 
 
-def _fits(method: Method, rows: list[dict[str, str]], entry: Distribution) -> Iterator[Finding]:
-    tallies = _Tallies()
-    mine = [row for row in rows if row["source"] == entry.name]
-    keys = ("target", "regime")
-    for (target, regime), group in groupby(mine, lambda row: tuple(row[key] for key in keys)):
+def _gammas(end: Distribution, values: Array) -> list[Array]:
+    return [np.full_like(values, end.gamma)] if end.second_parameter else []
+
+
+def _fits(method: Method, source: Distribution, rows: _Rows) -> Iterator[Finding]:
+    tallies = Tallies()
+    for (name, regime), group in groupby(rows, lambda row: (row["target"], row["regime"])):
         members = list(group)
-        if method.route(entry, distribution(target)) is None:
-            continue
-        values = [row["value"] for row in members]
-        for name in _FIT_METRICS:
-            exact = [Decimal(row[name]) for row in members]
-            batch = _Batch(entry.name, target, regime, 2, values, exact)
+        target = distribution(name)
+        for metric in map(metric_named, _FIT_METRICS):
+            if method.route(source, target) is None or not method.covers_metric(metric):
+                continue
+            exact = [Decimal(row[metric.name]) for row in members]
+            batch = _Batch(source, target, regime, [row["value"] for row in members], exact)
             for dtype in _DTYPES:
-                given = batch.given(dtype)
-                ours = convert(given, entry.name, target, method.name, metric=metric(name))
-                tallies.of(entry.name, f"{method.name} {name}", regime, dtype).add(
-                    ours, None, exact, batch.places
+                ours = convert(batch.of_type(dtype), source.name, name, method.name, metric=metric)
+                tallies.of(source.name, f"{method.name} {metric.name}", regime, dtype).add(
+                    ours, None, exact, batch.cases
                 )
     yield from tallies.findings()
 
 
-def _encodings(entry: Distribution) -> Iterator[Finding]:
-    tallies = _Tallies()
-    for encoding in entry.encodings:
-        label = f"{entry.name}:{encoding.name}"
-        for regime, values in _ENCODED.items():
+def _encodings(source: Distribution) -> Iterator[Finding]:
+    tallies = Tallies()
+    for encoding in source.encodings:
+        label = f"{source.name}:{encoding.name}"
+        for regime, texts in _ENCODED.items():
             for dtype in _DTYPES:
-                given = np.array(values, dtype=dtype)
-                tallies.of(entry.name, f"{encoding.name} and back", regime, dtype).add(
-                    convert(convert(given, entry.name, label), label, entry.name),
+                values = np.array(texts, dtype=dtype)
+                tallies.of(source.name, f"{encoding.name} and back", regime, dtype).add(
+                    convert(convert(values, source.name, label), label, source.name),
                     None,
-                    [Decimal(float(value)) for value in given],
-                    [f"{value} → {encoding.name} → α" for value in values],
+                    [Decimal(float(value)) for value in values],
+                    [f"{text} → {encoding.name} → {source.parameter.symbol}" for text in texts],
                 )
     yield from tallies.findings()
-
-
-class _Tallies:
-    """The tallies of several groups, in the order in which they were first asked for."""
-
-    def __init__(self) -> None:
-        self._found: dict[tuple[str, str, str, str], Tally] = {}
-
-    def of(self, source: str, rule: str, regime: str, dtype: Any) -> Tally:
-        kind = np.dtype(dtype)
-        key = (source, rule, regime, kind.name)
-        return self._found.setdefault(key, Tally(source, rule, regime, kind))
-
-    def findings(self) -> Iterator[Finding]:
-        return (tally.finding() for tally in self._found.values())

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
+from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 
 DTYPES = (np.float64, np.float32, np.float16)
@@ -35,9 +37,10 @@ class Finding:
     out_of_range : int
         How many of them have an exact value that the type holds only as 0, a subnormal number
         or infinity. They are right if the result is that; no error can be stated.
-    error : float
-        The largest relative error against the exact value; inf or NaN for a failure.
-    error_in_eps : float
+    error : float or str
+        The largest relative error against the exact value; inf or NaN for a failure, empty where
+        there is no case.
+    error_in_eps : float or str
         The same in units of the type's rounding, ``numpy.finfo(dtype).eps``; a correctly
         rounded result has at most ½.
     textbook : float or str
@@ -53,8 +56,8 @@ class Finding:
     dtype: str
     cases: int
     out_of_range: int
-    error: float
-    error_in_eps: float
+    error: float | str
+    error_in_eps: float | str
     textbook: float | str
     worst: str
 
@@ -75,7 +78,7 @@ class Tally:
         self._dtype = dtype
         self._ours: list[float] = []
         self._textbook: list[float] = []
-        self._places: list[str] = []
+        self._cases: list[str] = []
         self._out_of_range = 0
 
     def add(
@@ -83,19 +86,22 @@ class Tally:
         values: Array,
         textbook: Array | None,
         exact: Sequence[Decimal],
-        places: Sequence[str],
+        cases: Sequence[str],
     ) -> None:
-        """Compare values of the group's type, and the printed expression's, with exact ones."""
+        """Compare values of the group's type, and the printed expression's, with exact ones.
+
+        `cases` says in words what each of them is.
+        """
         self._ours += relative_errors(values, exact)
         if textbook is not None:
             self._textbook += relative_errors(textbook, exact)
-        self._places += places
+        self._cases += cases
         self._out_of_range += sum(not _in_range(value, self._dtype) for value in exact)
 
     def finding(self) -> Finding:
         """Return the worst."""
-        place = int(np.argmax(np.nan_to_num(self._ours, nan=np.inf)))
-        error = self._ours[place]
+        index = int(np.argmax(np.nan_to_num(self._ours, nan=np.inf)))
+        error = self._ours[index]
         return Finding(
             *self._group,
             dtype=self._dtype.name,
@@ -104,8 +110,31 @@ class Tally:
             error=two_digits(error),
             error_in_eps=two_digits(error / float(np.finfo(self._dtype).eps)),
             textbook=_worst_of_textbook(self._textbook),
-            worst=self._places[place],
+            worst=self._cases[index],
         )
+
+
+class Tallies:
+    """The tallies of several groups, in the order in which they were first asked for."""
+
+    def __init__(self) -> None:
+        self._tallies: dict[tuple[str, str, str, str], Tally] = {}
+
+    def of(self, distribution: str, rule: str, regime: str, dtype: Any) -> Tally:
+        """Return the tally of a group."""
+        kind = np.dtype(dtype)
+        key = (distribution, rule, regime, kind.name)
+        return self._tallies.setdefault(key, Tally(distribution, rule, regime, kind))
+
+    def findings(self) -> Iterator[Finding]:
+        """Return the worst of each group."""
+        return (tally.finding() for tally in self._tallies.values())
+
+
+def no_references(audited: Distribution, dtype: Any) -> Iterator[Finding]:
+    """Yield the finding of a distribution for which no exact value is stored."""
+    group = (audited.name, "unit", "no stored references", np.dtype(dtype).name)
+    yield Finding(*group, cases=0, out_of_range=0, error="", error_in_eps="", textbook="", worst="")
 
 
 def relative_errors(values: Array, exact: Sequence[Decimal]) -> list[float]:

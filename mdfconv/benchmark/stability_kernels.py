@@ -9,13 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.benchmark.stability_finding import DTYPES, Finding, Tally, read_rows
-from mdfconv.benchmark.stability_textbook import printed_kernel
+from mdfconv.benchmark.stability_finding import DTYPES, Finding, Tallies, no_references, read_rows
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.gtr import GTR
+from mdfconv.distributions.evaluation import Array
 
-# With one exponent the two are one function.
-_SAME_FORM = {"ashikhmin-shirley": "blinn-phong"}
+_Rows = list[dict[str, str]]
 
 
 def audit_kernels(chosen: Sequence[Distribution]) -> Iterator[Finding]:
@@ -34,36 +32,66 @@ def audit_kernels(chosen: Sequence[Distribution]) -> Iterator[Finding]:
         One for each distribution, form, regime and type.
     """
     cases = {dtype: _read(dtype) for dtype in DTYPES}
-    for entry in chosen:
+    for audited in chosen:
         for dtype, by_name in cases.items():
-            yield from _findings(entry, by_name[_SAME_FORM.get(entry.name, entry.name)], dtype)
+            rows = by_name.get(audited.name) or by_name.get(_same_function(audited), [])
+            yield from _findings(audited, rows, dtype) if rows else no_references(audited, dtype)
 
 
-def _read(dtype: type) -> dict[str, list[dict[str, str]]]:
+def _read(dtype: type) -> dict[str, _Rows]:
     rows = read_rows(f"kernels-{np.dtype(dtype).name}.csv")
     return {name: list(group) for name, group in groupby(rows, lambda row: row["distribution"])}
 
 
-def _findings(entry: Distribution, rows: list[dict[str, str]], dtype: Any) -> Iterator[Finding]:
-    tallies: dict[tuple[str, str], Tally] = {}
+def _same_function(audited: Distribution) -> str:
+    """Return the name of the distribution that is this one in the same parameter, if any."""
+    equal = audited.equivalent
+    return equal.name if equal and equal.same_lobe and equal.same_parameter else ""
+
+
+def _findings(audited: Distribution, rows: _Rows, dtype: Any) -> Iterator[Finding]:
+    tallies = Tallies()
     keys = ("form", "regime", "parameter", "gamma")
     for (form, regime, parameter, gamma), group in groupby(
         rows, lambda row: tuple(row[key] for key in keys)
     ):
         members = list(group)
         beta = np.array([row["beta"] for row in members], dtype=dtype)
-        p, exponent = dtype(parameter), dtype(gamma or 2)
-        options = {"gamma": exponent} if isinstance(entry, GTR) else {}
-        evaluate = entry.unit if form == "unit" else entry.normalized
-        where = f"{entry.parameter.symbol} = {parameter}" + (f", γ = {gamma}" if gamma else "")
-        tally = tallies.setdefault((form, regime), Tally(entry.name, form, regime, np.dtype(dtype)))
+        p, shape = dtype(parameter), audited
+        if audited.second_parameter:
+            shape = audited.with_gamma(float(dtype(gamma or audited.gamma)))
+        evaluate = shape.unit if form == "unit" else shape.normalized
+        where = f"{audited.parameter.symbol} = {parameter}" + (f", γ = {gamma}" if gamma else "")
         # float16 overflows where the normalized form of a mirror-smooth surface exceeds 65504.
         with np.errstate(over="ignore"):
-            values = evaluate(beta, p, **options)
-        tally.add(
+            values = evaluate(beta, p)
+        tallies.of(audited.name, form, regime, dtype).add(
             values,
-            printed_kernel(entry.name, form, beta, p, exponent),
+            printed_form(shape, form, beta, p),
             [Decimal(row["value"]) for row in members],
             [f"β = {row['beta']}, {where}" for row in members],
         )
-    return (tally.finding() for tally in tallies.values())
+    return tallies.findings()
+
+
+def printed_form(shape: Distribution, form: str, beta: Array, parameter: Any) -> Array:
+    """Return the printed unit form, or the printed normalized form at the normal.
+
+    Parameters
+    ----------
+    shape : Distribution
+        The distribution, with its γ if it has one.
+    form : str
+        ``"unit"`` or ``"normalized"``.
+    beta : numpy.ndarray
+        Angles, radians; 0 for the normalized form.
+    parameter : numpy scalar
+        The parameter, in the type of the angles.
+    """
+    printed = shape.printed
+    arguments = [parameter] + [beta.dtype.type(shape.gamma)] * bool(shape.second_parameter)
+    with np.errstate(all="ignore"):
+        # Where the maximum is off the normal, D̄ is not D(β)/D(0): that is 1 at the normal.
+        off_axis = form == "normalized" and shape.mode(np.asarray(float(parameter))) > 0
+        value = np.ones_like(beta) if off_axis else printed.unit(beta, *arguments)
+        return value if form == "unit" else value * printed.at_normal(*arguments)

@@ -10,16 +10,13 @@ import numpy as np
 
 from mdfconv.benchmark.samples import hemisphere
 from mdfconv.benchmark.timing import Advance, Sizes, Spread, interleave, spread
-from mdfconv.conversion.endpoint import same_family
-from mdfconv.conversion.residual import residual
+from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
-from mdfconv.fitting.core import fit
-from mdfconv.fitting.metrics import Metric, metric
+from mdfconv.fitting.fit import fit
+from mdfconv.fitting.metrics import Metric, metric_named
 
 PRECISIONS = ("float64", "float32")
-# Legal for every distribution: what is timed where there is no best fit.
-_ANY_PARAMETER = 1.0
 
 
 @dataclass(frozen=True)
@@ -93,33 +90,34 @@ def substitutes(
     list of Substitute
         For each parameter every candidate.
     """
-    found = []
-    errors = [_errors(reference, parameters, entry) for entry in candidates]
-    for row, given in enumerate(parameters.tolist()):
-        answers = [columns[:, row].tolist() for columns in errors]
-        pairs = [
-            (entry, _ANY_PARAMETER if np.isnan(answer[0]) else answer[0])
-            for entry, answer in zip(candidates, answers, strict=True)
+    fits = [_fit_and_errors(reference, parameters, candidate) for candidate in candidates]
+    rows = []
+    for number, reference_parameter in enumerate(parameters.tolist()):
+        answers = [columns[:, number].tolist() for columns in fits]
+        # Where there is no best fit a typical lobe is timed.
+        timed = [
+            (candidate, candidate.parameter.typical_value if np.isnan(answer[0]) else answer[0])
+            for candidate, answer in zip(candidates, answers, strict=True)
         ]
         times = [
-            evaluation_times(pairs, precision, sizes.angles, sizes.rounds, advance)
+            evaluation_times(timed, precision, sizes.angles, sizes.rounds, advance)
             for precision in PRECISIONS
         ]
-        found += [
+        rows += [
             Substitute(
                 reference=reference.name,
-                reference_parameter=given,
-                distribution=entry.name,
-                operations=entry.operations,
+                reference_parameter=reference_parameter,
+                distribution=candidate.name,
+                operations=candidate.operations,
                 parameter=answer[0],
                 rmse=answer[1],
                 max_error=answer[2],
                 energy_error=answer[3],
                 ns=dict(zip(PRECISIONS, both, strict=True)),
             )
-            for entry, answer, *both in zip(candidates, answers, *times, strict=True)
+            for candidate, answer, *both in zip(candidates, answers, *times, strict=True)
         ]
-    return found
+    return rows
 
 
 def count_steps(parameters: int, sizes: Sizes) -> int:
@@ -128,7 +126,7 @@ def count_steps(parameters: int, sizes: Sizes) -> int:
 
 
 def evaluation_times(
-    pairs: Sequence[tuple[Distribution, float]],
+    lobes: Sequence[tuple[Distribution, float]],
     precision: str,
     angles: int,
     rounds: int,
@@ -138,7 +136,7 @@ def evaluation_times(
 
     Parameters
     ----------
-    pairs : sequence of (Distribution, float)
+    lobes : sequence of (Distribution, float)
         Distributions and their parameters.
     precision : str
         ``"float32"`` or ``"float64"``.
@@ -151,19 +149,19 @@ def evaluation_times(
     """
     beta = np.linspace(0, np.pi / 2, angles, dtype=precision)
     functions = {
-        str(place): _evaluation(entry, parameter, beta)
-        for place, (entry, parameter) in enumerate(pairs)
+        str(number): _evaluation(candidate, parameter, beta)
+        for number, (candidate, parameter) in enumerate(lobes)
     }
     times = interleave(functions, rounds, advance)
     return [spread(1e9 * samples / angles) for samples in times.values()]
 
 
-def _evaluation(entry: Distribution, parameter: float, beta: Array) -> Callable[[], object]:
-    return lambda: entry.unit(beta, parameter)
+def _evaluation(candidate: Distribution, parameter: float, beta: Array) -> Callable[[], object]:
+    return lambda: candidate.unit(beta, parameter)
 
 
 def best(
-    source: Distribution, parameter: Array, target: Distribution, measure: Metric
+    source: Distribution, parameter: Array, target: Distribution, metric: Metric
 ) -> tuple[Array, Array, Array]:
     """Return the best fits of a target, and the error that they leave under the metric.
 
@@ -173,7 +171,7 @@ def best(
         The reference, and what takes its place.
     parameter : numpy.ndarray, shape (n,)
         Legal parameters of the source.
-    measure : Metric
+    metric : Metric
         Under which is fitted and compared.
 
     Returns
@@ -181,26 +179,26 @@ def best(
     parameter, rmse, max_error : numpy.ndarray, shape (n,)
         NaN where there is no best fit; the parameter itself, and no error, for the source.
     """
-    if same_family(source, target):
+    if source.is_same(target):
         return parameter, np.zeros_like(parameter), np.zeros_like(parameter)
-    result = fit(source, parameter, target, measure).parameter
-    there = ~np.isnan(result)
+    result = fit(source, parameter, target, metric).parameter
+    fitted = ~np.isnan(result)
     errors = np.full((2, parameter.size), np.nan)
-    errors[:, there] = residual(source, parameter[there], target, result[there], measure)
+    errors[:, fitted] = remaining_error(source, parameter[fitted], target, result[fitted], metric)
     return result, errors[0], errors[1]
 
 
-def _errors(source: Distribution, parameter: Array, target: Distribution) -> Array:
+def _fit_and_errors(source: Distribution, parameter: Array, target: Distribution) -> Array:
     """Return parameter, RMSE, maximum and energy error, shape (4, n)."""
-    columns = best(source, parameter, target, metric("unit"))
+    columns = best(source, parameter, target, metric_named("unit"))
     return np.stack([*columns, _energy_error(source, parameter, target)])
 
 
 def _energy_error(source: Distribution, parameter: Array, target: Distribution) -> Array:
-    measure = metric("energy")
-    result, *_ = best(source, parameter, target, measure)
-    beta, weight, wanted, peak = hemisphere(source, parameter, measure)
-    got = measure.signal_of(target, beta, result[:, None], peak)
+    metric = metric_named("energy")
+    result, *_ = best(source, parameter, target, metric)
+    beta, weight, wanted, peak = hemisphere(source, parameter, metric)
+    got = metric.signal(target, beta, result[:, None], peak)
     share: Array = np.sqrt(
         np.sum(weight * np.square(got - wanted), axis=1)
         / np.sum(weight * np.square(wanted), axis=1)

@@ -12,17 +12,17 @@ from mdfconv.benchmark.methods import LOOP, MethodSpeed
 from mdfconv.benchmark.pareto import front
 from mdfconv.benchmark.substitutes import PRECISIONS, Substitute
 from mdfconv.benchmark.timing import NOISE
-
-_RATIONAL = ("schlick", "sawicki", "smoothie")
-_EXPONENTIAL = ("beckmann", "gauss", "blinn-phong")
+from mdfconv.distributions import distribution
 
 
-def on_substitutes(found: Measurements) -> list[str]:
+def on_substitutes(measurements: Measurements) -> list[str]:
     """Say whether rational forms are the faster ones, and which distributions pay."""
-    sentences = [_rational(found.substitutes, precision) for precision in reversed(PRECISIONS)]
-    sentences += [_without_tangent(found.kernels, precision) for precision in reversed(PRECISIONS)]
+    precisions = PRECISIONS[::-1]
+    sentences = [_rational(measurements.substitutes, precision) for precision in precisions]
+    for precision in precisions:
+        sentences += _without_tangent(measurements.kernels, precision)
     groups: dict[tuple[str, float], list[Substitute]] = {}
-    for row in found.substitutes:
+    for row in measurements.substitutes:
         groups.setdefault((row.reference, row.reference_parameter), []).append(row)
     return sentences + [_worth_it(rows) for rows in groups.values()]
 
@@ -31,22 +31,29 @@ def _rational(rows: Sequence[Substitute], precision: str) -> str:
     samples: dict[str, list[float]] = {}
     for row in rows:
         samples.setdefault(row.distribution, []).append(row.ns[precision].median)
-    times = {name: float(np.median(samples[name])) for name in (*_RATIONAL, *_EXPONENTIAL)}
-    quickest = min(_EXPONENTIAL, key=times.__getitem__)
-    winners = [name for name in _RATIONAL if times[name] < (1 - NOISE) * times[quickest]]
+    times = {name: float(np.median(values)) for name, values in samples.items()}
+    rational = [name for name in times if "exp" not in distribution(name).functions]
+    others = sorted((name for name in times if name not in rational), key=times.__getitem__)
+    start = f"In {precision}, from β,"
+    if not rational or not others:
+        kind = "rational forms" if rational else "forms with an exponential or a power"
+        return f"{start} the {kind} take {_listed(times, list(times))} ns."
+    quickest, slowest = others[0], others[-1]
+    winners = [name for name in rational if times[name] < (1 - NOISE) * times[quickest]]
     gain = f"speed for {_and(winners)} only" if winners else "no speed"
+    comparisons = [_against(times, rational, name) for name in dict.fromkeys((slowest, quickest))]
     return (
-        f"In {precision}, from β, the rational forms take {_listed(times, _RATIONAL)} ns, those "
-        f"with an exponential or a power {_listed(times, _EXPONENTIAL)} ns. Of the rational ones "
-        f"{_against(times, 'beckmann')}; {_against(times, quickest)}. On the vector units of this "
-        f"machine, being rational buys {'speed' if winners == list(_RATIONAL) else gain}."
+        f"{start} the rational forms take {_listed(times, rational)} ns, those with an "
+        f"exponential or a power {_listed(times, others)} ns. Of the rational ones "
+        f"{'; '.join(comparisons)}. On the vector units of this machine, being rational buys "
+        f"{'speed' if winners == rational else gain}."
     )
 
 
-def _against(times: dict[str, float], other: str) -> str:
+def _against(times: dict[str, float], rational: Sequence[str], other: str) -> str:
     """Say which rational forms are faster or slower than another form by more than the noise."""
-    faster = [name for name in _RATIONAL if times[name] < (1 - NOISE) * times[other]]
-    slower = [name for name in _RATIONAL if times[name] > (1 + NOISE) * times[other]]
+    faster = [name for name in rational if times[name] < (1 - NOISE) * times[other]]
+    slower = [name for name in rational if times[name] > (1 + NOISE) * times[other]]
     return f"{_are(faster)} faster than {other}, {_are(slower)} slower"
 
 
@@ -54,22 +61,25 @@ def _are(names: Sequence[str]) -> str:
     return f"{_and(names) or 'none'} {'are' if len(names) > 1 else 'is'}"
 
 
-def _without_tangent(rows: Sequence[KernelSpeed], precision: str) -> str:
-    there = {row.distribution: row for row in rows if row.precision == precision}
-    tangent = there["ggx"].floor.median - there["ggx"].copy.median
-    names = [name for name in (*_RATIONAL, "beckmann", "blinn-phong") if name in there]
-    left = {name: there[name].kernel.median - tangent for name in names}
-    return (
+def _without_tangent(rows: Sequence[KernelSpeed], precision: str) -> list[str]:
+    """Say what the forms cost a renderer that has cos β; nothing if no tangent is timed."""
+    timed = [row for row in rows if row.precision == precision and "tan" in row.functions.split()]
+    tangents = [row.floor.median - row.copy.median for row in timed if row.functions == "tan copy"]
+    if not tangents:
+        return []
+    tangent = float(np.median(tangents))
+    rest = {row.distribution: row.kernel.median - tangent for row in timed}
+    return [
         f"A renderer that has cos β needs no tangent of β: without its {tangent:.2g} ns in "
-        f"{precision}, {_listed(left, names)} ns are left."
-    )
+        f"{precision}, {_listed(rest, list(rest))} ns remain."
+    ]
 
 
 def _worth_it(rows: Sequence[Substitute]) -> str:
     best = front([(row.ns["float32"].median, row.rmse) for row in rows], NOISE)
     listed = [
         f"{row.distribution} ({row.ns['float32'].median:.2g} ns, RMSE {row.rmse:.2g})"
-        for row in (rows[place] for place in best)
+        for row in (rows[number] for number in best)
     ]
     return (
         f"In the place of {rows[0].reference} at {rows[0].reference_parameter:g}, but for noise "
@@ -77,9 +87,9 @@ def _worth_it(rows: Sequence[Substitute]) -> str:
     )
 
 
-def on_methods(found: Measurements) -> list[str]:
+def on_methods(measurements: Measurements) -> list[str]:
     """Say how fast the methods are, and how far from the best fit."""
-    rows = found.methods
+    rows = measurements.methods
     fits = {row.metric: row for row in rows if row.method == "fit"}
     sentences = [_approximation(row) for row in rows if row.method not in ("fit", LOOP)]
     for row in rows:
@@ -100,11 +110,11 @@ def _approximation(row: MethodSpeed) -> str:
     )
 
 
-def on_kernels(found: Measurements) -> list[str]:
+def on_kernels(measurements: Measurements) -> list[str]:
     """Say how the kernels compare with the printed expressions and with their floor."""
     sentences = []
     for precision in PRECISIONS:
-        rows = [row for row in found.kernels if row.precision == precision]
+        rows = [row for row in measurements.kernels if row.precision == precision]
         speedups = [row.speedup for row in rows]
         floors = [row.over_floor for row in rows]
         sentences.append(
@@ -112,7 +122,7 @@ def on_kernels(found: Measurements) -> list[str]:
             f"fast as the printed expressions in NumPy, and take {min(floors):.2g} to "
             f"{max(floors):.2g} times as long as the functions that they cannot avoid."
         )
-    most = max(row.memory for row in found.kernels)
+    most = max(row.memory for row in measurements.kernels)
     return [*sentences, f"They allocate at most {most:.3g} times the size of the result."]
 
 

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
+from numpy.typing import NDArray
 
 from mdfconv.distributions.evaluation import Array
+
+# A BRDF of (light, view), 1/sr, 0 where either is not above the surface. In colour the three
+# channels come first: shape (3, n) for directions of shape (n, 3).
+Brdf: TypeAlias = Callable[[Array, Array], Array]
 
 _MIRROR = np.array([-1.0, -1.0, 1.0])
 
@@ -43,7 +51,40 @@ def half_vector(light: Array, view: Array) -> Array:
     return unit(light + view)
 
 
-def angles(vectors: Array) -> tuple[Array, Array]:
-    """Return the angle from the normal and the azimuth, radians, accurate at both ends."""
+def above(light: Array, view: Array) -> NDArray[np.bool_]:
+    """Return where light and viewer both are above the surface."""
+    both: NDArray[np.bool_] = (light[..., 2] > 0) & (view[..., 2] > 0)
+    return both
+
+
+def polar_angle(vectors: Array) -> Array:
+    """Return the angle from the normal, radians, accurate at both ends."""
     x, y, z = np.moveaxis(vectors, -1, 0)
-    return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
+    return np.arctan2(np.hypot(x, y), z)
+
+
+def azimuth(vectors: Array) -> Array:
+    """Return the azimuth from the x axis, radians."""
+    return np.arctan2(vectors[..., 1], vectors[..., 0])
+
+
+def frames(normals: Array) -> Array:
+    """Return right-handed orthonormal frames whose z axes are normals (Duff et al. 2017).
+
+    Parameters
+    ----------
+    normals : numpy.ndarray, shape (..., 3)
+        Unit vectors.
+
+    Returns
+    -------
+    numpy.ndarray, shape (..., 3, 3)
+        The axes as rows: a matrix times a direction is that direction in the frame.
+    """
+    x, y, z = np.moveaxis(normals, -1, 0)
+    sign = np.where(z < 0, -1.0, 1.0)
+    a = -1 / (sign + z)
+    b = x * y * a
+    first = np.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=-1)
+    second = np.stack([b, sign + y * y * a, -y], axis=-1)
+    return np.stack([first, second, normals], axis=-2)

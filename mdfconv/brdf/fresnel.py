@@ -6,15 +6,27 @@ unpolarized reflectance in the same shape, float64.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 
+# Reflectance for cosines of the angle of incidence, shape (n,) or (): of their shape for a grey
+# material, of shape (3, n) or (3, 1) for a coloured one.
+Fresnel: TypeAlias = Callable[[Array], Array | float]
+
 NORMAL_REFLECTANCE = 0.04  # a dielectric of index 1.5
 # The constants that the article on Smoothie prints.
 SMOOTHIE_FIT = (-1.71983, -5.43926)
+
+
+def lossless(cosine: Array) -> float:
+    """Return 1, the reflectance of what absorbs nothing."""
+    return 1.0
 
 
 def dielectric(cosine: ArrayLike, ior: float) -> Array:
@@ -32,7 +44,7 @@ def dielectric(cosine: ArrayLike, ior: float) -> Array:
     -------
     numpy.ndarray
         ½ (r_s² + r_p²), in [0, 1]. Next to the critical angle, where the slope is infinite,
-        it is exact for a cosine within rounding of the given one.
+        it is exact for a cosine within rounding of this one.
 
     Raises
     ------

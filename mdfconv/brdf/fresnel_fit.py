@@ -120,7 +120,11 @@ def fit(
     counts = weight(cosine)
     # A weight between two points underflows to 0 everywhere.
     if not np.square(counts.sum()) >= _FEWEST_POINTS * np.square(counts).sum() > 0:
-        raise MdfconvError("the weight is narrower than the grid of the fit: raise --sigma")
+        raise MdfconvError(
+            "the weight is narrower than the grid of the fit",
+            "a larger σ covers it",
+            argument="sigma",
+        )
     target, root, path = rescaled(cosine, ior), np.sqrt(counts), 2 * np.square(cosine)
     # A residual has a scale of its own, which a small index contrast makes tiny.
     root /= np.linalg.norm(root * target)
@@ -136,10 +140,10 @@ def fit(
     usable = target > 0
     strength = (root * target)[usable]
     b, a = np.polyfit(path[usable], np.log2(target[usable]), 1, w=strength)
-    found = least_squares(residual, [a, b], jacobian, xtol=1e-12, ftol=1e-14, gtol=1e-14)
-    if not found.success:
+    solution = least_squares(residual, [a, b], jacobian, xtol=1e-12, ftol=1e-14, gtol=1e-14)
+    if not solution.success:
         raise MdfconvError(f"no fit converged for index {ior:g} under this weight")
-    return FresnelFit(ior, weight, *map(float, found.x))
+    return FresnelFit(ior, weight, *map(float, solution.x))
 
 
 def _check(ior: float, mu: float, sigma: float) -> Weight:

@@ -13,20 +13,22 @@ from typing import TypeAlias
 
 import numpy as np
 
-from mdfconv.brdf.directions import direction, dot, reflect
-from mdfconv.distributions.evaluation import Array
+from mdfconv.brdf.directions import Brdf, direction, dot, reflect
+from mdfconv.distributions.evaluation import Array, gauss_legendre
 
-Reflection: TypeAlias = Callable[[Array, Array], Array]
 Sampler: TypeAlias = Callable[[Array, Array, Array], tuple[Array, Array]]
 
+# Gauss's rule of this order on panels that grow by this factor, from a fiftieth of the peak's
+# width on, leaves an error of 1e-8; of order 8 it leaves 2e-7.
 _ORDER = 12
 _GROWTH = 2.5
-# Of the width of a peak: where the panels around it begin.
 _FIRST_PANEL = 0.02
+# Where the integrand ends like a root the panels shrink to this, whose share is below rounding.
 _LEAST_PANEL = 1e-8
 # Nearer to grazing rounding shows, and the limit is within 1e-6 from here on.
 _LEAST_COSINE = 1e-8
-_CHUNK = 4
+# With some 500 nodes for each azimuth the intermediates of as many stay in the cache.
+_AZIMUTHS_AT_ONCE = 32
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class FurnaceModel:
 
     Parameters
     ----------
-    reflection : callable
+    brdf : callable
         f(light, view), 1/sr, for unit vectors of shape (..., 3).
     width : float
         About the angle, in radians, over which f falls from its peak.
@@ -46,14 +48,14 @@ class FurnaceModel:
         From (view, u₁, u₂) to light directions and their density, 1/sr.
     """
 
-    reflection: Reflection
+    brdf: Brdf
     width: float
     around_mirror: bool
     sample: Sampler
 
 
 def directional_albedo(model: FurnaceModel, cosine: Array) -> Array:
-    """Integrate f cos θ_l over the hemisphere, to about 1e-9.
+    """Integrate f cos θ_l over the hemisphere, to 1e-8; with V-cavities to 1e-6.
 
     Parameters
     ----------
@@ -102,7 +104,7 @@ def sampled_albedo(
 def _estimate(model: FurnaceModel, cosine: float, numbers: Array) -> tuple[float, float]:
     view = np.broadcast_to(_viewer(max(cosine, _LEAST_COSINE)), (*numbers[0].shape, 3))
     light, density = model.sample(view, *numbers)
-    value = model.reflection(light, view) * light[..., 2]
+    value = model.brdf(light, view) * light[..., 2]
     weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
     return float(weight.mean()), float(weight.std(ddof=1) / np.sqrt(weight.size))
 
@@ -125,13 +127,13 @@ def _around_normal(model: FurnaceModel, cosine: float) -> float:
     kinks = _kinks(along, cosine)
     total = 0.0
     view = _viewer(cosine)
-    for rows in np.array_split(np.arange(phi.size), max(1, phi.size // _CHUNK)):
+    for rows in np.array_split(np.arange(phi.size), max(1, phi.size // _AZIMUTHS_AT_ONCE)):
         t, weight = _from_zero(horizon[rows], kinks[rows], model.width)
         theta = np.arctan(t)
         m = direction(theta, phi[rows, None])
         light = reflect(np.broadcast_to(view, m.shape), m)
         jacobian = 4 * dot(m, view) * np.sin(theta) * np.square(np.cos(theta))
-        value = model.reflection(light, np.broadcast_to(view, m.shape)) * light[..., 2]
+        value = model.brdf(light, np.broadcast_to(view, m.shape)) * light[..., 2]
         total += float(phi_weight[rows] @ np.sum(value * jacobian * weight, axis=1))
     # The two halves of the circle are alike.
     return 2 * total
@@ -165,7 +167,7 @@ def _from_zero(end: Array, kinks: Array, width: float) -> tuple[Array, Array]:
     edges = _growing(min(_FIRST_PANEL * width, largest), largest)
     every = np.concatenate([np.broadcast_to(edges, (end.size, edges.size)), kinks], axis=1)
     rows = np.sort(np.minimum(every, end[:, None]), axis=1)
-    x, w = np.polynomial.legendre.leggauss(_ORDER)
+    x, w = gauss_legendre(_ORDER)
     half = 0.5 * np.diff(rows, axis=1)[:, :, None]
     nodes = rows[:, :-1, None] + half * (1 + x)
     return nodes.reshape(end.size, -1), (half * w).reshape(end.size, -1)
@@ -178,7 +180,7 @@ def _growing(first: float, end: float) -> Array:
 
 
 def _gauss(edges: Array) -> tuple[Array, Array]:
-    x, w = np.polynomial.legendre.leggauss(_ORDER)
+    x, w = gauss_legendre(_ORDER)
     half = 0.5 * np.diff(edges)[:, None]
     return (edges[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
 
@@ -192,17 +194,17 @@ def _around_mirror(model: FurnaceModel, cosine: float) -> float:
     grazing = np.arctan2(cosine, sine)  # from the mirror image down to the horizon
     theta, theta_weight = _rings(grazing, model.width)
     ratio = cosine * np.cos(theta) / np.maximum(sine * np.sin(theta), 1e-300)
-    # Rings beyond the horizon reach up to this azimuth from the highest point.
-    reach = np.arccos(np.clip(-ratio, -1, 1))
-    x, w = np.polynomial.legendre.leggauss(4 * _ORDER)
-    phi = 0.5 * reach[:, None] * (1 + x)
-    weight = 0.5 * reach[:, None] * w
+    # Rings beyond the horizon end at this azimuth from the highest point.
+    last = np.arccos(np.clip(-ratio, -1, 1))
+    x, w = gauss_legendre(4 * _ORDER)
+    phi = 0.5 * last[:, None] * (1 + x)
+    weight = 0.5 * last[:, None] * w
     view = _viewer(cosine)
     mirrored = np.array([-view[0], 0.0, view[2]])
     up, side = np.array([view[2], 0.0, view[0]]), np.array([0.0, 1.0, 0.0])
     ring = np.cos(phi)[..., None] * up + np.sin(phi)[..., None] * side
     light = np.cos(theta)[:, None, None] * mirrored + np.sin(theta)[:, None, None] * ring
-    value = model.reflection(light, np.broadcast_to(view, light.shape)) * light[..., 2]
+    value = model.brdf(light, np.broadcast_to(view, light.shape)) * light[..., 2]
     rings = np.sum(value * weight, axis=1) * np.sin(theta)
     return float(2 * theta_weight @ rings)
 

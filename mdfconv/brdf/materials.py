@@ -6,15 +6,14 @@ their index of refraction.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from mdfconv.brdf.fresnel import dielectric, schlick_fresnel
-from mdfconv.distributions.evaluation import Array
-from mdfconv.errors import check_name, unknown_name
+from mdfconv.brdf.fresnel import Fresnel, dielectric, schlick_fresnel
+from mdfconv.registry import Registry
 
 # F₀ in linear Rec. 709 R, G, B: Lagarde 2011, "Feeding a physically based shading model", from
 # measured η and k; iron is that of Hoffman's course notes of 2010.
@@ -36,9 +35,6 @@ PLASTICS: Mapping[str, float] = {
     "polystyrene": 1.59,
 }
 
-# Reflectance for cosines of the angle of incidence.
-Fresnel = Callable[[Array | float], Array | float]
-
 
 @dataclass(frozen=True)
 class Material:
@@ -49,17 +45,24 @@ class Material:
     name : str
         Its name.
     fresnel : callable
-        Reflectance for cosines of shape (n,) or (): of the same shape for a grey material, of
-        shape (3, n) or (3, 1) for a coloured one, linear Rec. 709.
+        Reflectance of cosines; of a coloured one in linear Rec. 709 R, G, B.
     """
 
     name: str
     fresnel: Fresnel
 
 
+_REGISTRY: Registry[Material] = Registry("material")
+for _name, _color in METALS.items():
+    _normal = np.array(_color)[:, None]
+    _REGISTRY.add(_name, Material(_name, partial(schlick_fresnel, normal_reflectance=_normal)))
+for _name, _index in PLASTICS.items():
+    _REGISTRY.add(_name, Material(_name, partial(dielectric, ior=_index)))
+
+
 def list_materials() -> list[str]:
     """Return the names of the materials, metals first."""
-    return [*METALS, *PLASTICS]
+    return _REGISTRY.names
 
 
 def material(name: str) -> Material:
@@ -72,10 +75,4 @@ def material(name: str) -> Material:
     MdfconvError
         If the name is unknown.
     """
-    key = check_name("material", name).strip().lower()
-    if key in METALS:
-        normal = np.array(METALS[key])[:, None]
-        return Material(key, partial(schlick_fresnel, normal_reflectance=normal))
-    if key in PLASTICS:
-        return Material(key, partial(dielectric, ior=PLASTICS[key]))
-    raise unknown_name("material", name, list_materials())
+    return _REGISTRY[name]

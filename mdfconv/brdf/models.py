@@ -1,32 +1,40 @@
 """The BRDFs of the white-furnace test by name, with their samplers.
 
-A new one is a function here and one entry in `_MODELS`.
+A new one is a function from its parameter to a `FurnaceModel`, and one line at the end.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
-from mdfconv.brdf import phong, smoothie
-from mdfconv.brdf.directions import dot, mirrored, reflect
-from mdfconv.brdf.furnace import FurnaceModel, Reflection, Sampler
-from mdfconv.brdf.masking import masking as find_masking
-from mdfconv.brdf.microfacet import ashikhmin_shirley, reflection
-from mdfconv.brdf.sampling import (
-    cosine_lobe,
-    cosine_lobe_density,
-    half_vector_density,
-    half_vectors,
-    reflected_density,
-    visible_normal_density,
-    visible_normals,
-)
+from mdfconv.brdf import phong, reflection
+from mdfconv.brdf.directions import Brdf, dot, mirrored, reflect
+from mdfconv.brdf.fresnel import Fresnel, lossless
+from mdfconv.brdf.furnace import FurnaceModel
+from mdfconv.brdf.masking import MASKINGS
+from mdfconv.brdf.microsurface import Microsurface
+from mdfconv.brdf.sampling import cosine_lobe, cosine_lobe_density, reflected_density
 from mdfconv.distributions import distribution
 from mdfconv.distributions.evaluation import Array
-from mdfconv.distributions.smoothie import to_ggx
-from mdfconv.errors import MdfconvError, unknown_name
+from mdfconv.errors import MdfconvError
+from mdfconv.registry import Registry
+
+
+@dataclass(frozen=True)
+class _Definition:
+    """A BRDF by name: how it is built, and the one option that it has."""
+
+    name: str
+    build: Callable[..., FurnaceModel]
+    option: str = ""
+
+
+_REGISTRY: Registry[_Definition] = Registry("BRDF")
+# Why a BRDF does not take an option.
+_WITHOUT = {"normalizer": "{} has no normalizer", "masking": "the masking of {} is part of it"}
 
 
 def furnace_model(
@@ -39,114 +47,98 @@ def furnace_model(
     name : str
         One of `list_models`.
     parameter : float
-        Exponent of the Phong BRDFs, α of the others.
+        Exponent of the Phong BRDFs, the distribution's parameter of the others.
     normalizer : str, optional
-        Of modified Phong: one of `mdfconv.brdf.phong.NORMALIZERS`; "usual" if not given.
+        Of modified Phong: a name in `mdfconv.brdf.phong.NORMALIZERS`; "usual" by default.
     masking : str, optional
-        Of ggx and beckmann: one of `mdfconv.brdf.masking.MASKINGS`; "correlated" if not given.
+        Of ggx and beckmann: a name in `mdfconv.brdf.masking.MASKINGS`; "correlated" by
+        default.
 
     Raises
     ------
     MdfconvError
         If a name is not known, does not apply, or the parameter is illegal.
     """
-    key = name.strip().lower()
-    if key not in _MODELS:
-        raise unknown_name("BRDF", name, list(_MODELS))
-    if normalizer is not None and key != "modified-phong":
-        raise MdfconvError(f"{key} has no normalizer: modified-phong has")
-    if masking is not None and key not in ("ggx", "beckmann"):
-        raise MdfconvError(f"the masking of {key} is part of it: ggx and beckmann have a choice")
-    return _MODELS[key](float(parameter), normalizer or "usual", masking or "correlated")
+    definition = _REGISTRY[name]
+    options = {"normalizer": normalizer, "masking": masking}
+    chosen = {option: value for option, value in options.items() if value is not None}
+    for option in chosen:
+        if option != definition.option:
+            others = " and ".join(other.name for other in _REGISTRY if other.option == option)
+            reason = _WITHOUT[option].format(definition.name)
+            raise MdfconvError(reason, f"it can be chosen for {others}")
+    return definition.build(float(parameter), **chosen)
 
 
 def list_models() -> list[str]:
     """Return the names of the BRDFs."""
-    return list(_MODELS)
+    return _REGISTRY.names
 
 
-def _microfacets(name: str) -> Callable[[float, str, str], FurnaceModel]:
-    def model(alpha: float, normalizer: str, masking: str) -> FurnaceModel:
-        entry = distribution(name)
-        alpha = entry.parameter.check_one(alpha, name)
-        shadow = find_masking(masking, name, alpha)
+def _microfacets(name: str) -> Callable[..., FurnaceModel]:
+    def build(alpha: float, masking: str = "correlated") -> FurnaceModel:
+        surface = Microsurface(distribution(name), alpha)
+        shadow = MASKINGS[masking](surface)
+        return _facet_model(reflection.microfacet(surface, lossless, shadow), surface)
 
-        def reflect_light(light: Array, view: Array) -> Array:
-            return reflection(light, view, entry, alpha, shadow)
-
-        return FurnaceModel(reflect_light, alpha, False, _microfacet_sampler(name, alpha))
-
-    return model
+    return build
 
 
-def _microfacet_sampler(name: str, alpha: float) -> Sampler:
-    """Return a sampler of reflected directions: by visible normals for GGX, else by D cos θ."""
+def _with_distribution(
+    name: str, brdf: Callable[[Microsurface, Fresnel], Brdf]
+) -> Callable[..., FurnaceModel]:
+    def build(parameter: float) -> FurnaceModel:
+        surface = Microsurface(distribution(name), parameter)
+        return _facet_model(brdf(surface, lossless), surface)
+
+    return build
+
+
+def _facet_model(brdf: Brdf, surface: Microsurface) -> FurnaceModel:
+    """Return the model of a BRDF in half vectors, sampled by the facets of its surface."""
 
     def sample(view: Array, u1: Array, u2: Array) -> tuple[Array, Array]:
-        if name == "ggx":
-            m = visible_normals(view, alpha, u1, u2)
-            density = visible_normal_density(view, alpha, m)
+        if surface.has_visible_normals:
+            m = surface.visible_normals(view, u1, u2)
+            density = surface.visible_normal_density(view, m)
         else:
-            m = half_vectors(name, alpha, u1, u2)
-            density = half_vector_density(name, alpha, m)
+            m = surface.half_vectors(u1, u2)
+            density = surface.half_vector_density(m)
         density = np.where(dot(view, m) > 0, density, 0)
         return reflect(view, m), reflected_density(density, view, m)
 
-    return sample
+    width = float(surface.distribution.peak_alpha(surface.parameter))
+    return FurnaceModel(brdf, width, False, sample)
 
 
-def _phong(reflect_light: Reflection, exponent: float) -> FurnaceModel:
+def _original_phong(exponent: float) -> FurnaceModel:
+    return _mirror_model(phong.original(exponent), exponent)
+
+
+def _modified_phong(exponent: float, normalizer: str = "usual") -> FurnaceModel:
+    return _mirror_model(phong.modified(exponent, normalizer), exponent)
+
+
+def _mirror_model(brdf: Brdf, exponent: float) -> FurnaceModel:
+    """Return the model of a BRDF around the mirror image of the viewer."""
+
     def sample(view: Array, u1: Array, u2: Array) -> tuple[Array, Array]:
         axis = mirrored(view)
         light = cosine_lobe(axis, exponent, u1, u2)
         return light, cosine_lobe_density(axis, exponent, light)
 
-    return FurnaceModel(reflect_light, 1 / np.sqrt(exponent + 1), True, sample)
+    return FurnaceModel(brdf, 1 / np.sqrt(exponent + 1), True, sample)
 
 
-def _original_phong(exponent: float, normalizer: str, masking: str) -> FurnaceModel:
-    phong.check_exponent(exponent)
-    return _phong(lambda light, view: phong.original(light, view, exponent), exponent)
-
-
-def _modified_phong(exponent: float, normalizer: str, masking: str) -> FurnaceModel:
-    phong.normalization(normalizer, np.ones(1), exponent)
-
-    def reflect_light(light: Array, view: Array) -> Array:
-        return phong.modified(light, view, exponent, normalizer)
-
-    return _phong(reflect_light, exponent)
-
-
-def _smoothie(
-    function: Callable[[Array, Array, float], Array],
-) -> Callable[[float, str, str], FurnaceModel]:
-    def model(alpha: float, normalizer: str, masking: str) -> FurnaceModel:
-        alpha = distribution("smoothie").parameter.check_one(alpha, "smoothie")
-        width = float(to_ggx(np.asarray(alpha)))
-        sample = _microfacet_sampler("ggx", width)
-        return FurnaceModel(lambda light, view: function(light, view, alpha), width, False, sample)
-
-    return model
-
-
-def _ashikhmin_shirley(exponent: float, normalizer: str, masking: str) -> FurnaceModel:
-    entry = distribution("ashikhmin-shirley")
-    exponent = entry.parameter.check_one(exponent, entry.name)
-    width = float(np.sqrt(2 / (exponent + 2)))
-
-    def reflect_light(light: Array, view: Array) -> Array:
-        return ashikhmin_shirley(light, view, entry, exponent)
-
-    return FurnaceModel(reflect_light, width, False, _microfacet_sampler("ggx", width))
-
-
-_MODELS: dict[str, Callable[[float, str, str], FurnaceModel]] = {
-    "ggx": _microfacets("ggx"),
-    "beckmann": _microfacets("beckmann"),
-    "phong": _original_phong,
-    "modified-phong": _modified_phong,
-    "smoothie": _smoothie(smoothie.exact),
-    "smoothie-approx": _smoothie(smoothie.approximate),
-    "ashikhmin-shirley": _ashikhmin_shirley,
-}
+for _definition in (
+    _Definition("ggx", _microfacets("ggx"), "masking"),
+    _Definition("beckmann", _microfacets("beckmann"), "masking"),
+    _Definition("phong", _original_phong),
+    _Definition("modified-phong", _modified_phong, "normalizer"),
+    _Definition("smoothie", _with_distribution("smoothie", reflection.smoothie)),
+    _Definition("smoothie-approx", _with_distribution("smoothie", reflection.smoothie_approx)),
+    _Definition(
+        "ashikhmin-shirley", _with_distribution("ashikhmin-shirley", reflection.ashikhmin_shirley)
+    ),
+):
+    _REGISTRY.add(_definition.name, _definition)

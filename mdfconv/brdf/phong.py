@@ -1,4 +1,4 @@
-"""Phong's reflection, original and modified, and its normalizers.
+"""Phong's reflection, a lobe around the mirror image of the viewer, and its normalizers.
 
 Directions are unit vectors, shape (..., 3), with the surface normal along z; θ_r is the angle
 between the light and the mirror image of the viewer.
@@ -7,73 +7,87 @@ between the light and the mirror image of the viewer.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 from scipy.special import betainc, poch
 
-from mdfconv.brdf.directions import mirrored
+from mdfconv.brdf.directions import Brdf, above, mirrored
 from mdfconv.distributions.evaluation import Array
-from mdfconv.errors import MdfconvError, unknown_name
+from mdfconv.errors import MdfconvError
+from mdfconv.registry import Registry
 
+# I_M for cosines of the viewer with the normal, and an exponent γ ≥ 0.
+Normalizer: TypeAlias = Callable[[Array, float], Array]
+
+# More steps of the recurrence take seconds, and another normalizer takes one.
 _LARGEST_RECURRENCE = 1e5
+
+
+def around_mirror(lobe: Callable[[Array], Array], factor: Callable[[Array], Array | float]) -> Brdf:
+    """Return the BRDF lobe(θ_r) factor(n·v) for θ_r < π/2.
+
+    A lobe with long tails ends with an edge.
+
+    Parameters
+    ----------
+    lobe : callable
+        Of angles θ_r, radians.
+    factor : callable
+        Of cosines n·v: the Fresnel term, or what normalizes the lobe.
+    """
+
+    def brdf(light: Array, view: Array) -> Array:
+        # By the chord: an arccos loses its digits near 0.
+        chord = np.linalg.norm(light - mirrored(view), axis=-1)
+        angle = 2 * np.arcsin(np.minimum(0.5 * chord, 1))
+        lit = above(light, view) & (angle < 0.5 * np.pi)
+        value = np.where(lit, lobe(np.where(lit, angle, 0)), 0)
+        return value * factor(np.maximum(view[..., 2], 0))
+
+    return brdf
+
+
+def original(exponent: float) -> Brdf:
+    """Return the original Phong BRDF (γ+1)/(2π) cos^γ θ_r / cos θ_i (Phong 1975).
+
+    It is not reciprocal: the cosine is that of the light.
+
+    Parameters
+    ----------
+    exponent : float
+        γ ≥ 0.
+    """
+    lobe = around_mirror(_cosine_power(exponent), lambda cosine: (exponent + 1) / (2 * np.pi))
+    return lambda light, view: lobe(light, view) / np.where(light[..., 2] > 0, light[..., 2], 1)
+
+
+def modified(exponent: float, normalizer: str = "usual") -> Brdf:
+    """Return the modified Phong BRDF cos^γ θ_r / I (Lafortune & Willems 1994).
+
+    Parameters
+    ----------
+    exponent : float
+        γ ≥ 0.
+    normalizer : str
+        What I is: a name in `NORMALIZERS`. With the usual one, a constant, the BRDF is
+        reciprocal; with the others, functions of the viewer, it reflects all energy instead.
+    """
+    integral = NORMALIZERS[normalizer]
+    return around_mirror(_cosine_power(exponent), lambda cosine: 1 / integral(cosine, exponent))
+
+
+def _cosine_power(exponent: float) -> Callable[[Array], Array]:
+    """Return cos^γ of an angle below π/2, with its digits near 0."""
+    check_exponent(exponent)
+    # cos θ = 1 − 2 sin²(θ/2)
+    return lambda angle: np.exp(exponent * np.log1p(-2 * np.square(np.sin(0.5 * angle))))
 
 
 def check_exponent(exponent: float) -> None:
     """Raise an MdfconvError unless an exponent is a finite number from 0 up."""
     if not 0 <= exponent < np.inf:
         raise MdfconvError(f"Phong's exponent is at least 0, not {exponent:g}")
-
-
-def _lobe(light: Array, view: Array, exponent: float) -> Array:
-    """Return cos^γ θ_r above the surface, 0 elsewhere, with its digits near the mirror image."""
-    check_exponent(exponent)
-    # cos θ = 1 − ½|l − r|²; the chord keeps what 1 − cos loses.
-    drop = 0.5 * np.square(light - mirrored(view)).sum(axis=-1)
-    lit = (light[..., 2] > 0) & (view[..., 2] > 0) & (drop < 1)
-    with np.errstate(divide="ignore"):
-        value = np.exp(exponent * np.log1p(-np.where(lit, drop, 0)))
-    return np.where(lit, value, 0)
-
-
-def original(light: Array, view: Array, exponent: float) -> Array:
-    """Return the original Phong BRDF (γ+1)/(2π) cos^γ θ_r / cos θ_i (Phong 1975).
-
-    Parameters
-    ----------
-    light, view : numpy.ndarray, shape (..., 3)
-        Unit vectors.
-    exponent : float
-        γ ≥ 0.
-
-    Returns
-    -------
-    numpy.ndarray, shape (...)
-        The BRDF, 1/sr. It is not reciprocal: the cosine is that of the light.
-    """
-    lobe = _lobe(light, view, exponent)
-    cosine = np.where(light[..., 2] > 0, light[..., 2], 1)
-    return (exponent + 1) / (2 * np.pi) * lobe / cosine
-
-
-def modified(light: Array, view: Array, exponent: float, normalizer: str = "usual") -> Array:
-    """Return the modified Phong BRDF cos^γ θ_r / I (Lafortune & Willems 1994).
-
-    Parameters
-    ----------
-    light, view : numpy.ndarray, shape (..., 3)
-        Unit vectors.
-    exponent : float
-        γ ≥ 0.
-    normalizer : str
-        What I is: one of `NORMALIZERS`. With the usual one, a constant, the BRDF is
-        reciprocal; with the others, functions of the viewer, it reflects all energy instead.
-
-    Returns
-    -------
-    numpy.ndarray, shape (...)
-        The BRDF, 1/sr.
-    """
-    return _lobe(light, view, exponent) / normalization(normalizer, view[..., 2], exponent)
 
 
 def normalization(normalizer: str, cosine: Array, exponent: float) -> Array:
@@ -93,8 +107,6 @@ def normalization(normalizer: str, cosine: Array, exponent: float) -> Array:
     MdfconvError
         If the name is not known, or the exponent not one that the normalizer takes.
     """
-    if normalizer not in NORMALIZERS:
-        raise unknown_name("normalizer", normalizer, list(NORMALIZERS))
     check_exponent(exponent)
     return NORMALIZERS[normalizer](np.asarray(cosine, float), float(exponent))
 
@@ -110,7 +122,7 @@ def arvo(cosine: Array, exponent: float) -> Array:
         raise MdfconvError(f"Arvo's normalizer takes an integer exponent, not {exponent:g}")
     if exponent > _LARGEST_RECURRENCE:
         raise MdfconvError(
-            f"Arvo's normalizer takes {exponent:g} steps: use mallett-yuksel, which takes one"
+            f"Arvo's normalizer takes {exponent:g} steps", "use mallett-yuksel, which takes one"
         )
     sine_square = (1 - cosine) * (1 + cosine)
     even = exponent % 2 == 0
@@ -141,8 +153,7 @@ def mallett_yuksel(cosine: Array, exponent: float) -> Array:
     return (np.pi * cosine * (1 + share) + np.sqrt(np.pi) * ratio * power) / (exponent + 2)
 
 
-NORMALIZERS: dict[str, Callable[[Array, float], Array]] = {
-    "usual": usual,
-    "arvo": arvo,
-    "mallett-yuksel": mallett_yuksel,
-}
+NORMALIZERS: Registry[Normalizer] = Registry("normalizer")
+NORMALIZERS.add("usual", usual)
+NORMALIZERS.add("arvo", arvo)
+NORMALIZERS.add("mallett-yuksel", mallett_yuksel)

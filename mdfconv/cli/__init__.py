@@ -16,7 +16,8 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from mdfconv import __version__
-from mdfconv.errors import MdfconvError, unknown_name
+from mdfconv.errors import MdfconvError
+from mdfconv.registry import unknown_name
 
 _COMMANDS = (
     "convert",
@@ -47,7 +48,9 @@ class _Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
         known = [
-            name for entry in self.get_params(ctx) for name in (*entry.opts, *entry.secondary_opts)
+            name
+            for option in self.get_params(ctx)
+            for name in (*option.opts, *option.secondary_opts)
         ]
         for word in args[: args.index("--")] if "--" in args else args:
             name = word.partition("=")[0]
@@ -56,6 +59,17 @@ class _Command(TyperCommand):
                 hint = f"; did you mean {near[0]}?" if near else ""
                 raise MdfconvError(f"no such option: {name}{hint}")
         return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except MdfconvError as error:
+            options = {option.name: option.opts[0] for option in self.get_params(ctx)}
+            if error.argument not in options:
+                raise
+            # The library speaks of its arguments; here they are options.
+            hint = f"{error.hint} ({options[error.argument]})"
+            raise MdfconvError(error.reason, hint) from None
 
 
 def _is_number(text: str) -> bool:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.output import FormOption, TableFormat, default_form, progress, write_records
-from mdfconv.errors import MdfconvError
+from mdfconv.cli.options import Format, FormatOption, PngOption
+from mdfconv.cli.outputs import check_outputs, write_named
+from mdfconv.cli.tables import form_of, progress, table_text, write_table
+from mdfconv.output.files import file_bytes
+from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
     from mdfconv.benchmark.measure import Measurements, Task
     from mdfconv.distributions.evaluation import Array
 
-_REFERENCE = "beckmann"
-_PARAMETERS = (0.2, 0.05)
+# The paper's reference, and its common rough and smooth surface.
+_REFERENCE, _PARAMETERS = "beckmann", (0.2, 0.05)
 
 
 def command(
@@ -33,23 +35,21 @@ def command(
     ] = None,
     source: Annotated[
         str, typer.Option("--from", metavar="MDF", help="Source of the timed conversions.")
-    ] = "beckmann",
+    ] = _REFERENCE,
     target: Annotated[
         str, typer.Option("--to", metavar="MDF", help="Target of the timed conversions.")
     ] = "ggx",
     quick: Annotated[
         bool, typer.Option("--quick", help="Seconds in place of a minute: fewer values, rounds.")
     ] = False,
-    format_: FormOption = None,
+    format_: FormatOption = None,
     csv: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the tables as one CSV.")
     ] = None,
     json: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write tables and machine as JSON.")
     ] = None,
-    png: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw error against time.")
-    ] = None,
+    png: PngOption = None,
 ) -> None:
     """Measure speed against error on this machine.
 
@@ -69,39 +69,22 @@ def command(
     mdfconv bench --format markdown --png speed-error.png > speed-error.md
     """
     from mdfconv.benchmark.measure import measure
-    from mdfconv.reports.text import file_bytes, write_files
 
-    places = [place for place in (csv, json, png) if place]
-    _check_places(places)
+    check_outputs(csv, json, png)
     task = _task(reference, parameter, source, target, quick=quick)
     with progress("Measuring", task.steps) as advance:
-        found = measure(task, advance)
+        measurements = measure(task, advance)
     contents: dict[Path, bytes] = {}
     if csv:
-        contents[csv] = file_bytes(_csv(found))
+        contents[csv] = file_bytes(_csv(measurements))
     if json:
-        contents[json] = file_bytes(_json(found))
+        contents[json] = file_bytes(_json(measurements))
     if png:
         from mdfconv.benchmark.figure import draw
 
-        contents[png] = draw(found)
-    write_files(contents)
-    _print(found, format_ or default_form(None), png)
-    for place in places:
-        typer.echo(f"mdfconv: wrote {place}", err=True)
-
-
-def _check_places(places: list[Path]) -> None:
-    """Refuse places that cannot be written, before anything is measured."""
-    if len({place.resolve() for place in places}) < len(places):
-        raise MdfconvError("two outputs have the same name: give each its own file")
-    for place in places:
-        if place.is_dir():
-            raise MdfconvError(f"cannot write {place}: Is a directory")
-        if not place.parent.is_dir():
-            raise MdfconvError(f"cannot write {place}: {place.parent} is not an existing directory")
-        if not os.access(place.parent, os.W_OK):
-            raise MdfconvError(f"cannot write {place}: Permission denied")
+        contents[png] = draw(measurements)
+    write_named(contents)
+    _print(measurements, form_of(format_), png)
 
 
 def _task(
@@ -109,19 +92,17 @@ def _task(
 ) -> Task:
     from mdfconv.benchmark.measure import Task
     from mdfconv.benchmark.timing import FULL, QUICK
-    from mdfconv.cli.names import one_parameter_distributions, one_parameter_names
     from mdfconv.conversion.endpoint import endpoint
-    from mdfconv.distributions import distribution
+    from mdfconv.distributions import one_parameter_distribution, one_parameter_distributions
 
-    side = endpoint(reference)
-    one_parameter_names([side.distribution.name])
-    names = [one_parameter_names([name])[0] for name in (source, target)]
+    end = endpoint(reference)
+    one_parameter_distribution(end.distribution.name)
     return Task(
-        reference=side.distribution,
-        parameters=side.decode(parameter) if parameter else _default_lobes(side.distribution.name),
+        reference=end.distribution,
+        parameters=end.decode(parameter) if parameter else _default_lobes(end.distribution.name),
         candidates=tuple(one_parameter_distributions()),
-        source=distribution(names[0]),
-        target=distribution(names[1]),
+        source=one_parameter_distribution(source),
+        target=one_parameter_distribution(target),
         sizes=QUICK if quick else FULL,
     )
 
@@ -134,33 +115,32 @@ def _default_lobes(name: str) -> Array:
     return np.asarray(convert(np.array(_PARAMETERS), _REFERENCE, name, "half-angle"))
 
 
-def _print(found: Measurements, form: TableFormat, png: Path | None) -> None:
+def _print(measurements: Measurements, form: Format, png: Path | None) -> None:
     from mdfconv.benchmark import page
 
-    if form is TableFormat.csv:
-        typer.echo(_csv(found))
-    elif form is TableFormat.json:
-        typer.echo(_json(found))
-    elif form is TableFormat.markdown:
-        typer.echo(page.markdown_page(found, png.name if png else None))
+    if form is Format.csv:
+        typer.echo(_csv(measurements))
+    elif form is Format.json:
+        typer.echo(_json(measurements))
+    elif form is Format.markdown:
+        typer.echo(page.markdown_page(measurements, png.name if png else None))
     else:
-        said = page.sentences(found)
-        for name, rows in page.tables(found).items():
-            write_records(list(rows[0]), rows, form, None, page.title(found, name))
-            typer.echo("\n".join(said[name]) + "\n")
+        sentences = page.sentences(measurements)
+        for name, rows in page.tables(measurements).items():
+            write_table(list(rows[0]), rows, form, title=page.title(measurements, name))
+            typer.echo("\n".join(sentences[name]) + "\n")
 
 
-def _csv(found: Measurements) -> str:
-    from mdfconv.reports.text import csv_text
+def _csv(measurements: Measurements) -> str:
+    tables = measurements.records()
+    columns = dict.fromkeys(name for rows in tables.values() for row in rows for name in row)
+    blank = dict.fromkeys(columns)
+    rows = [{"table": name} | blank | row for name, table in tables.items() for row in table]
+    return table_text(["table", *columns], rows, Format.csv)
 
-    rows = [{"table": name} | row for name, table in found.records().items() for row in table]
-    columns = dict.fromkeys(column for row in rows for column in row)
-    return csv_text(list(columns), rows)
 
-
-def _json(found: Measurements) -> str:
+def _json(measurements: Measurements) -> str:
     from mdfconv.benchmark.page import sentences
-    from mdfconv.reports.text import json_text
 
-    content: dict[str, Any] = {"machine": found.machine, "sizes": vars(found.sizes)}
-    return json_text(content | found.records() | {"verdicts": sentences(found)})
+    content: dict[str, Any] = {"machine": measurements.machine, "sizes": vars(measurements.sizes)}
+    return json_text(content | measurements.records() | {"verdicts": sentences(measurements)})

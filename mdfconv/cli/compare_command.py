@@ -8,13 +8,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.folder import check_folder, write_all
-from mdfconv.cli.names import one_parameter_names
-from mdfconv.cli.output import TableFormat, write_records
-from mdfconv.errors import MdfconvError
+from mdfconv.cli.options import (
+    DpiOption,
+    FolderOption,
+    FormatOption,
+    MdfOption,
+    MethodOption,
+    chosen_metric,
+)
+from mdfconv.cli.outputs import check_folder, write_named
+from mdfconv.cli.tables import write_table
+from mdfconv.distributions import one_parameter_distribution
+from mdfconv.output.files import file_bytes
+from mdfconv.output.records import csv_text
 
 if TYPE_CHECKING:
-    from mdfconv.reports.comparison import Rule
+    from mdfconv.render.comparison import Rule
 
 _COLUMNS = (
     "figure", "conversion", "distribution", "parameter", "rmse_linear", "psnr_linear",
@@ -46,18 +55,8 @@ def command(
             "--m-b", metavar="M", help="Beckmann's m_B; repeatable; default 0.4 and 0.04464."
         ),
     ] = None,
-    mdf: Annotated[
-        list[str] | None,
-        typer.Option("--mdf", metavar="MDF", help="Distribution to show; repeatable."),
-    ] = None,
-    method: Annotated[
-        str | None,
-        typer.Option(
-            metavar="METHOD",
-            help="One conversion; by default closed-form (shape), fit energy (light) and fit "
-            "display (picture).",
-        ),
-    ] = None,
+    mdf: MdfOption = None,
+    method: MethodOption = None,
     metric: Annotated[
         str | None, typer.Option(metavar="METRIC", help="What --method fit keeps.")
     ] = None,
@@ -84,14 +83,9 @@ def command(
     ] = None,
     normalized: Annotated[bool, typer.Option("--normalized/--unit", help="The form of D.")] = True,
     size: Annotated[int, typer.Option(metavar="N", help="Pixels a side of a picture.")] = 256,
-    dpi: Annotated[int, typer.Option(metavar="N", help="Resolution of the sheet.")] = 120,
-    output: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder to write to; default ./reports.")
-    ] = None,
-    format_: Annotated[
-        TableFormat | None,
-        typer.Option("--format", help="Form of the table that is printed."),
-    ] = None,
+    dpi: DpiOption = 120,
+    output: FolderOption = None,
+    format_: FormatOption = None,
 ) -> None:
     """Render a sphere with one distribution put in another's place: Figures 3 to 5.
 
@@ -116,39 +110,35 @@ def command(
 
     mdfconv compare --m-b 0.3 --material gold --brdf smoothie
     """
-    from mdfconv.brdf.materials import material as find_material
-    from mdfconv.reports.comparison import PAPER_FIGURES, Scene, compare
-    from mdfconv.reports.comparison_figure import draw_comparison
-    from mdfconv.reports.error_curves import DRAWN
-    from mdfconv.reports.text import csv_text, file_bytes
+    from mdfconv.paper.error_curves import DRAWN
+    from mdfconv.render.comparison import PAPER_FIGURES, Scene, compare
+    from mdfconv.render.comparison_figure import draw_comparison
 
-    if not 1 <= dpi <= 2400:
-        raise MdfconvError("--dpi is from 1 to 2400")
     rules = _rules(method, metric, exposure)
-    names = one_parameter_names(mdf or DRAWN)
-    made_of = find_material(material).name if material else None
+    names = list(dict.fromkeys(one_parameter_distribution(name).name for name in mdf or DRAWN))
+    scene = Scene(brdf.value, light.value, normalized, exposure, size, material)
     folder = check_folder(output)
-    scene = Scene(brdf.value, light.value, normalized, exposure, size, made_of)
     figures = {f"compare-m_b-{value:g}": value for value in m_b or ()}
     rows: list[dict[str, Any]] = []
-    contents: dict[str, bytes] = {}
+    contents: dict[Path, bytes] = {}
     for name, value in (figures or PAPER_FIGURES).items():
-        found = compare(value, rules, scene, names)
-        rows += [{"figure": name} | row for row in found.table()]
-        columns, section = found.section_rows()
-        contents[f"{name}.csv"] = file_bytes(csv_text(columns, section))
-        contents[f"{name}.png"] = draw_comparison(found, dpi)
-    paths = write_all(folder, contents)
-    write_records(_COLUMNS, rows, format_, None, "Pictures against Beckmann's")
-    for path in paths:
-        typer.echo(f"mdfconv: wrote {path}", err=True)
+        comparison = compare(value, rules, scene, names)
+        rows += [{"figure": name} | row for row in comparison.table()]
+        columns, section = comparison.section_rows()
+        contents[folder / f"{name}.csv"] = file_bytes(csv_text(columns, section))
+        contents[folder / f"{name}.png"] = draw_comparison(comparison, dpi)
+    write_named(contents)
+    write_table(_COLUMNS, rows, format_, title="Pictures against Beckmann's")
 
 
 def _rules(method: str | None, metric: str | None, exposure: float) -> list[Rule]:
-    from mdfconv.conversion import find_method
-    from mdfconv.fitting.metrics import metric as find_metric
-    from mdfconv.reports.comparison import Rule, default_rules
+    from mdfconv.conversion import method_named
+    from mdfconv.fitting.metrics import metric_named
+    from mdfconv.render.comparison import Rule, default_rules
 
     if method is None and metric is None:
         return default_rules(exposure)
-    return [Rule(find_method(method or "fit").name, find_metric(metric or "unit", exposure))]
+    kept = metric_named(metric or "unit")
+    # A screen's picture is exposed as the scene is.
+    kept = chosen_metric(kept.name, exposure) if kept.setting == "exposure" else kept
+    return [Rule(method_named(method or "fit").name, kept)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -10,16 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.output import (
-    FileOption,
-    FormOption,
-    TableFormat,
-    default_form,
-    record_text,
-    write_records,
+from mdfconv.cli.options import (
+    Format,
+    FormatOption,
+    GammaOption,
+    OutputOption,
+    PngOption,
+    chosen_gamma,
 )
+from mdfconv.cli.outputs import check_outputs
+from mdfconv.cli.tables import form_of, table_text, tell, write_table
 from mdfconv.errors import MdfconvError
-from mdfconv.reports.text import file_bytes, write_files
+from mdfconv.output.files import file_bytes, write_files
 
 if TYPE_CHECKING:
     from mdfconv.distributions import Distribution
@@ -77,22 +79,19 @@ def command(
     loss: Annotated[Loss, typer.Option(help="Squared residuals, or those of logarithms.")] = (
         Loss.linear
     ),
-    gamma: Annotated[
-        float | None, typer.Option(metavar="G", help="γ of gtr; fitted if not given.")
-    ] = None,
+    gamma: GammaOption = None,
     tolerance: Annotated[
         float,
         typer.Option(metavar="T", help="How much worse than the best the simplest may be."),
     ] = 0.05,
-    format_: FormOption = None,
-    output: FileOption = None,
-    png: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw data, fits and residuals.")
-    ] = None,
+    format_: FormatOption = None,
+    output: OutputOption = None,
+    png: PngOption = None,
 ) -> None:
     """Fit distributions to measured reflectance or to a measured distribution of normals.
 
-    The model is offset + scale · D̄(β). Reads text (CSV, TSV, blanks; an angle and one or more
+    The model is offset + scale · D̄(β); a second parameter is fitted, too, unless --gamma gives it.
+    Reads text (CSV, TSV, blanks; an angle and one or more
     values a row), ALTA's 1-D text format and MERL's .binary. Ranks the fits, best first, and
     marks the simplest one that is nearly as good.
 
@@ -106,21 +105,23 @@ def command(
     """
     if not tolerance >= 0:
         raise MdfconvError("--tolerance is not negative")
-    _check_places(data, output, png)
-    samples = _read(data, angle, angle_unit, values)
-    samples = _restrict(samples, quantity, max_angle, data)
+    check_outputs(png, output, inputs=[data])
+    fixed = chosen_gamma(gamma)
+    shape = fixed if isinstance(fixed, float) else None
+    samples = _restrict(_read(data, angle, angle_unit, values), quantity, max_angle, data)
     parts = _parts(samples) if separate else [samples]
-    results = [_fit(part, _targets(targets), loss, gamma, tolerance, data) for part in parts]
-    form = format_ or default_form(output)
+    distributions = _targets(targets, shape)
+    results = [_fit(part, distributions, loss, shape, tolerance, data) for part in parts]
+    form = form_of(format_, output)
     columns, rows = _table(results, form, separate)
     contents = {}
     if output:
-        contents[output] = file_bytes(record_text(columns, rows, form))
+        contents[output] = file_bytes(table_text(columns, rows, form))
     if png:
         contents[png] = _picture(results[0], data.name, many=samples.values.shape[1] > 1)
     write_files(contents)
     if not output:
-        write_records(columns, rows, form, None, f"Fits to {data.name}")
+        write_table(columns, rows, form, title=f"Fits to {data.name}")
     _tell(samples, results, tolerance, separate)
 
 
@@ -133,16 +134,9 @@ class _Result:
     simplest: LobeFit
 
 
-def _check_places(data: Path, *places: Path | None) -> None:
-    """Refuse to write over the measurements."""
-    for place in places:
-        if place and place.exists() and data.exists() and place.samefile(data):
-            raise MdfconvError(f"{place} is the file of samples: write to another one")
-
-
 def _fit(
     samples: Samples,
-    targets: list[Distribution],
+    targets: Sequence[Distribution],
     loss: Loss,
     gamma: float | None,
     tolerance: float,
@@ -158,7 +152,7 @@ def _fit(
 
 
 def _table(
-    results: list[_Result], form: TableFormat, separate: bool
+    results: list[_Result], form: Format, separate: bool
 ) -> tuple[list[str], list[dict[str, Any]]]:
     rows = []
     for result in results:
@@ -176,19 +170,20 @@ def _picture(result: _Result, name: str, *, many: bool) -> bytes:
 
 def _tell(samples: Samples, results: list[_Result], tolerance: float, separate: bool) -> None:
     """Write notes and verdicts to standard error."""
-    notes = list(samples.notes)
-    if any(fit.at_limit for result in results for fit in result.fits):
-        notes.append("γ of gtr is at the end of the range that is searched")
-    for note in notes:
-        typer.echo(f"mdfconv: note: {note}", err=True)
+    limited = [fit.distribution for result in results for fit in result.fits if fit.at_limit]
+    notes = [
+        f"γ of {name} is at the end of the range that is searched"
+        for name in dict.fromkeys(distribution.name for distribution in limited)
+    ]
+    for note in (*samples.notes, *notes):
+        tell(f"note: {note}")
     for result in results:
         channel = f"channel {result.samples.channels[0]}: " if separate else ""
         cheap = result.simplest.distribution
-        typer.echo(
-            f"mdfconv: {channel}best is {result.fits[0].distribution.name}; simplest within "
+        tell(
+            f"{channel}best is {result.fits[0].distribution.name}; simplest within "
             f"{100 * tolerance:g} % of its error is {cheap.name}, at {cheap.operations} "
-            "operations an evaluation",
-            err=True,
+            "operations an evaluation"
         )
 
 
@@ -230,13 +225,38 @@ def _restrict(
     )
 
 
-def _targets(names: list[str] | None) -> list[Distribution]:
-    from mdfconv.cli.names import one_parameter_distributions
-    from mdfconv.distributions import distribution
+def _targets(names: list[str] | None, gamma: float | None) -> list[Distribution]:
+    """Return the distributions to fit: of all those that a given γ leaves legal.
 
-    if not names or "all" in [name.lower() for name in names]:
-        return one_parameter_distributions()
-    return list(dict.fromkeys(distribution(name) for name in names))
+    Raises
+    ------
+    MdfconvError
+        If a name is unknown, or γ is given and means nothing for those that are named.
+    """
+    import numpy as np
+
+    from mdfconv.distributions import distribution, one_parameter_distributions
+
+    every = not names or "all" in [name.lower() for name in names]
+    if every:
+        targets = one_parameter_distributions()
+    else:
+        targets = list(dict.fromkeys(distribution(name) for name in names or ()))
+    if gamma is None:
+        return targets
+    second = [target for target in targets if target.second_parameter]
+    if not second:
+        raise MdfconvError(f"{targets[0].name} has one parameter and no γ")
+    illegal = [
+        target
+        for target in second
+        if target.second_parameter and not target.second_parameter.accepts(np.asarray(gamma))
+    ]
+    if illegal and (not every or len(illegal) == len(second)):
+        illegal[0].with_gamma(gamma)  # says what is legal
+    for target in illegal:
+        tell(f"note: {target.name} is left out: it has no γ = {gamma:g}")
+    return [target for target in targets if target not in illegal]
 
 
 def _parts(samples: Samples) -> list[Samples]:
@@ -251,7 +271,7 @@ def _record(fit: LobeFit, is_simplest: bool) -> dict[str, Any]:
     return {
         "distribution": fit.distribution.name,
         "parameter": fit.parameters[0],
-        "gamma": fit.parameters[1] if free else getattr(fit.distribution, "gamma", None),
+        "gamma": fit.parameters[1] if free else fit.distribution.gamma,
         "stderr": fit.errors[0],
         "gamma_stderr": fit.errors[1] if free else None,
         "offset": list(fit.offset),
@@ -264,11 +284,11 @@ def _record(fit: LobeFit, is_simplest: bool) -> dict[str, Any]:
     }
 
 
-def _shown(rows: list[dict[str, Any]], form: TableFormat) -> list[dict[str, Any]]:
+def _shown(rows: list[dict[str, Any]], form: Format) -> list[dict[str, Any]]:
     """Return the records for the form: lists and nulls in JSON, text in the others."""
-    if form is TableFormat.json:
+    if form is Format.json:
         return rows
-    number = repr if form is TableFormat.csv else "{:.4g}".format
+    number = repr if form is Format.csv else "{:.4g}".format
     return [{key: _text(value, number) for key, value in row.items()} for row in rows]
 
 

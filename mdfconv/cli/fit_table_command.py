@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.output import FileOption, FormOption, progress, write_records
+from mdfconv.cli.options import (
+    ExposureOption,
+    FormatOption,
+    MetricOption,
+    OutputOption,
+    chosen_metric,
+    every_metric,
+)
+from mdfconv.cli.tables import progress, write_table
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
@@ -17,8 +25,8 @@ _LARGEST_SWEEP = 100_000
 
 
 def command(
-    format_: FormOption = None,
-    output: FileOption = None,
+    format_: FormatOption = None,
+    output: OutputOption = None,
     compare: Annotated[
         bool,
         typer.Option("--compare", help="Put each printed cell of the paper beside ours."),
@@ -34,19 +42,11 @@ def command(
     m_b: Annotated[
         list[float] | None, typer.Option("--m-b", metavar="M", help="Fit this m_B; repeatable.")
     ] = None,
-    metric: Annotated[
-        str,
-        typer.Option(
-            metavar="METRIC",
-            help="What the fit keeps: unit (the paper's), energy (the light) or display (the "
-            "picture on a screen).",
-        ),
-    ] = "unit",
-    exposure: Annotated[
-        float, typer.Option(metavar="E", help="Exposure for the display metric.")
-    ] = 1.0,
+    metric: MetricOption = "unit",
+    exposure: ExposureOption = None,
     extended: Annotated[
-        bool, typer.Option("--extended", help="Add gtr (α and γ), schlick and smoothie.")
+        bool,
+        typer.Option("--extended", help="Add what the paper's table lacks, with γ."),
     ] = False,
     closed_forms: Annotated[
         bool,
@@ -70,29 +70,29 @@ def command(
 
     mdfconv fit-table --closed-forms --format markdown
     """
-    from mdfconv.fitting.metrics import metric as find_metric
-
-    measure = find_metric(metric, exposure)
     if (compare or closed_forms) and (sweep or m_b or extended or compare == closed_forms):
         raise MdfconvError(
             "--compare and --closed-forms speak of the paper's rows: give one of them, without "
             "--sweep, --m-b or --extended"
         )
-    if compare and measure.name != "unit":
+    if closed_forms:
+        columns, rows, title = _closed_forms(exposure)
+        write_table(columns, rows, format_, output, title=title)
+        return
+    kept = chosen_metric(metric, exposure)
+    if compare and kept.name != "unit":
         raise MdfconvError("--compare: the paper's table has the unit metric only")
     if compare:
         columns, rows, title = _comparison()
-    elif closed_forms:
-        columns, rows, title = _closed_forms(exposure)
     else:
-        columns, rows, title = _table(measure, sweep, m_b, extended)
-    write_records(columns, rows, format_, output, title)
+        columns, rows, title = _table(kept, sweep, m_b, extended)
+    write_table(columns, rows, format_, output, title=title)
 
 
 def _comparison() -> tuple[list[str], list[dict[str, Any]], str]:
     from dataclasses import asdict
 
-    from mdfconv.reports.table2 import compare
+    from mdfconv.paper.table2 import compare
 
     rows = [asdict(cell) for cell in compare()]
     agreeing = sum(row["agrees"] for row in rows)
@@ -100,42 +100,22 @@ def _comparison() -> tuple[list[str], list[dict[str, Any]], str]:
     return list(rows[0]), rows, title
 
 
-def _closed_forms(exposure: float) -> tuple[list[str], list[dict[str, Any]], str]:
-    from mdfconv.fitting.metrics import list_metrics
-    from mdfconv.fitting.metrics import metric as find_metric
-    from mdfconv.reports.closed_forms import refit
+def _closed_forms(exposure: float | None) -> tuple[list[str], list[dict[str, Any]], str]:
+    from mdfconv.paper.closed_forms import refit_rows
 
-    rows = [
-        {
-            "from": found.form.source,
-            "to": found.form.target,
-            "formula": found.form.text,
-            "metric": found.metric,
-            "printed": _coefficients(found.form.printed),
-            "worst_printed": found.printed_error,
-            "refitted": _coefficients(found.coefficients),
-            "worst_refitted": found.error,
-        }
-        for name in list_metrics()
-        for found in refit(find_metric(name, exposure))
-    ]
+    rows = refit_rows(every_metric(exposure))
     return list(rows[0]), rows, "Closed forms: coefficients and worst relative error"
 
 
-def _coefficients(values: tuple[float, ...]) -> str:
-    return ", ".join(f"{letter}={value:.6g}" for letter, value in zip("ab", values, strict=False))
-
-
 def _table(
-    measure: Metric, sweep: str | None, m_b: list[float] | None, extended: bool
+    metric: Metric, sweep: str | None, m_b: list[float] | None, extended: bool
 ) -> tuple[list[str], list[dict[str, float]], str]:
-    from mdfconv.reports.table2 import COLUMNS, EXTENDED_COLUMNS, fit_table
+    from mdfconv.paper.table2 import fit_table
 
-    values, reach = _sweep(sweep, m_b)
+    values, limit = _sweep(sweep, m_b)
     with progress("Fitting", values.size) as advance:
-        rows = fit_table(values, reach, measure, extended=extended, progress=advance)
-    columns = [*COLUMNS, *(EXTENDED_COLUMNS if extended else ())]
-    return columns, rows, f"Fits of Beckmann, metric {measure.name}"
+        rows = fit_table(values, limit, metric, extended=extended, progress=advance)
+    return list(rows[0]), rows, f"Fits of Beckmann, metric {metric}"
 
 
 def _sweep(sweep: str | None, m_b: list[float] | None) -> tuple[Array, Array]:
@@ -143,7 +123,7 @@ def _sweep(sweep: str | None, m_b: list[float] | None) -> tuple[Array, Array]:
     import numpy as np
 
     from mdfconv.distributions import distribution
-    from mdfconv.reports.table2 import lobe_reach, paper_sweep
+    from mdfconv.paper.table2 import angle_limit, paper_sweep
 
     if sweep and m_b:
         raise MdfconvError("give either --sweep or --m-b")
@@ -156,7 +136,7 @@ def _sweep(sweep: str | None, m_b: list[float] | None) -> tuple[Array, Array]:
         low, high, count = _sweep_ends(sweep or "")
         ends = beckmann.parameter.check([low, high], "beckmann")
         values = np.geomspace(float(ends[0]), float(ends[1]), count)
-    return values, lobe_reach(values)
+    return values, angle_limit(values)
 
 
 def _sweep_ends(text: str) -> tuple[float, float, int]:

@@ -6,8 +6,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.output import TableFormat, write_records
-from mdfconv.errors import MdfconvError, unknown_name
+from mdfconv.cli.options import (
+    ExposureOption,
+    FormatOption,
+    FromOption,
+    GammaOption,
+    MetricOption,
+    ToOption,
+    chosen_metric,
+    fixed_gamma,
+)
+from mdfconv.cli.tables import write_table
+from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
     from mdfconv.formula import Problem
@@ -16,15 +26,8 @@ _COLUMNS = ("operations", "worst_error", "formula")
 
 
 def command(
-    source: Annotated[
-        str,
-        typer.Option(
-            "--from",
-            metavar="MDF",
-            help="Distribution to convert from; ggx:roughness names a stored form.",
-        ),
-    ],
-    target: Annotated[str, typer.Option("--to", metavar="MDF", help="Distribution to convert to.")],
+    source: FromOption,
+    target: ToOption,
     tolerance: Annotated[
         float,
         typer.Option(metavar="T", help="Worst relative error against the fit that is accepted."),
@@ -38,27 +41,16 @@ def command(
             "0.1:0.9, exponents 1:10000.",
         ),
     ] = None,
-    metric: Annotated[
-        str,
-        typer.Option(
-            metavar="METRIC",
-            help="What the fit keeps: unit (the shape), energy (the light) or display (the "
-            "picture).",
-        ),
-    ] = "unit",
-    exposure: Annotated[
-        float, typer.Option(metavar="E", help="Exposure for the display metric.")
-    ] = 1.0,
+    metric: MetricOption = "unit",
+    exposure: ExposureOption = None,
+    gamma: GammaOption = None,
     language: Annotated[
         str, typer.Option("--lang", metavar="LANG", help="glsl, hlsl, c, python or latex.")
     ] = "glsl",
     every: Annotated[
         bool, typer.Option("--all", help="Print the table of cost against error instead.")
     ] = False,
-    format_: Annotated[
-        TableFormat | None,
-        typer.Option("--format", help="Form of that table: table on a terminal, csv in a pipe."),
-    ] = None,
+    format_: FormatOption = None,
 ) -> None:
     """Print the cheapest formula for a conversion, to paste into a shader or an importer.
 
@@ -75,34 +67,31 @@ def command(
 
     mdfconv formula --from blinn-phong --to ggx --metric energy --all
     """
-    from mdfconv.conversion.endpoint import endpoint
-    from mdfconv.fitting.metrics import metric as find_metric
-    from mdfconv.formula import LANGUAGES, Problem, cheapest, usual_range, write_formula
+    from mdfconv.conversion.endpoint import endpoints
+    from mdfconv.formula import LANGUAGES, Problem, cheapest, write_formula
 
-    form = language.strip().lower()
-    if form not in LANGUAGES:
-        raise unknown_name("language", language, list(LANGUAGES))
     if format_ and not every:
         raise MdfconvError("--format is the form of the table of --all; a formula has --lang")
-    sides = endpoint(source), endpoint(target)
-    low, high = usual_range(sides[0]) if range_ is None else _range(range_)
-    problem = Problem(*sides, find_metric(metric, exposure), low, high)
+    LANGUAGES[language]  # names are wrong more often than ranges
+    ends = endpoints(source, target, fixed_gamma(gamma))
+    low, high = ends[0].stored.typical if range_ is None else _range(range_)
+    problem = Problem(*ends, chosen_metric(metric, exposure), low, high)
     if every:
-        title = f"Formulas from {sides[0].label} to {sides[1].label}, {low:g} to {high:g}"
-        write_records(_COLUMNS, _rows(problem), format_, None, title)
+        title = f"Formulas from {ends[0].label} to {ends[1].label}, {low:g} to {high:g}"
+        write_table(_COLUMNS, _rows(problem), format_, title=title)
     else:
-        typer.echo(write_formula(cheapest(problem, tolerance), problem, form))
+        typer.echo(write_formula(cheapest(problem, tolerance), problem, language))
 
 
 def _range(text: str) -> tuple[float, float]:
     low, colon, high = text.partition(":")
     try:
-        found = float(low), float(high)
+        ends = float(low), float(high)
     except ValueError:
         colon = ""
     if not colon:
         raise MdfconvError(f"--range is LO:HI, two numbers, not '{text}'")
-    return found
+    return ends
 
 
 def _rows(problem: Problem) -> list[dict[str, Any]]:

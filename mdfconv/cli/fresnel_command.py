@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mdfconv.cli.output import (
-    FileOption,
-    FormOption,
-    TableFormat,
-    check_distinct,
-    default_form,
-    write_records,
-)
+from mdfconv.cli.options import FormatOption, OutputOption, PngOption
+from mdfconv.cli.outputs import check_outputs, write_named
+from mdfconv.cli.tables import write_table
 
 
 def command(
@@ -28,11 +22,9 @@ def command(
     sigma: Annotated[
         float, typer.Option(metavar="S", help="Standard deviation of the weight.")
     ] = 0.12,
-    format_: FormOption = None,
-    output: FileOption = None,
-    png: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw the curves and their errors.")
-    ] = None,
+    format_: FormatOption = None,
+    output: OutputOption = None,
+    png: PngOption = None,
 ) -> None:
     """Fit the Fresnel term of the Smoothie article: exp2(a + b l.h), h = l + v not normalized.
 
@@ -51,20 +43,12 @@ def command(
     """
     from mdfconv.brdf.fresnel_fit import fit
     from mdfconv.reports.fresnel_page import COLUMNS, draw_fresnel, error_rows
-    from mdfconv.reports.text import write_files
 
-    check_distinct(png, output)
-    found = fit(ior, mu, sigma)
-    rows = error_rows(found)
-    form = format_ or default_form(output)
-    if form is not TableFormat.json:
-        # Null has no other form than JSON's: a cell stays empty.
-        rows = [
-            {name: "" if value is None else value for name, value in row.items()} for row in rows
-        ]
+    check_outputs(png, output)
+    fitted = fit(ior, mu, sigma)
+    title = (
+        f"exp2({fitted.a:.6g} {fitted.b:+.6g} l·h), IOR {ior:g}, weight {mu:g} ± {sigma:g} in l·h"
+    )
     if png:
-        write_files({png: draw_fresnel(found)})
-    title = f"exp2({found.a:.6g} {found.b:+.6g} l·h), IOR {ior:g}, weight {mu:g} ± {sigma:g} in l·h"
-    write_records(COLUMNS, rows, form, output, title)
-    if png:
-        typer.echo(f"mdfconv: wrote {png}", err=True)
+        write_named({png: draw_fresnel(fitted)})
+    write_table(COLUMNS, error_rows(fitted), format_, output, title=title)

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.output import FileOption, FormOption, check_distinct, write_records
+from mdfconv.cli.options import Format, FormatOption, OutputOption, PngOption
+from mdfconv.cli.outputs import check_outputs, write_named
+from mdfconv.cli.tables import write_table
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
@@ -59,11 +61,9 @@ def command(
         bool,
         typer.Option("--speed", help="Print speed against error of modified Phong's normalizers."),
     ] = False,
-    png: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw the albedo over the cosine.")
-    ] = None,
-    format_: FormOption = None,
-    output: FileOption = None,
+    png: PngOption = None,
+    format_: FormatOption = None,
+    output: OutputOption = None,
 ) -> None:
     """Put a BRDF that absorbs nothing into a white furnace: how much light comes back.
 
@@ -98,26 +98,23 @@ def command(
         raise MdfconvError(f"--mc needs 2 samples or more, at most {_MOST_SAMPLES}")
     if seed < 0:
         raise MdfconvError(f"--seed is at least 0, not {seed}")
-    check_distinct(png, output)
+    check_outputs(png, output)
     model = furnace_model(brdf, parameter, normalizer=normalizer, masking=masking)
     rows = _rows(model, np.linspace(0, 1, points), samples, seed)
-    title = f"White furnace: {brdf} {parameter:g}"
+    label = f"{brdf} {parameter:g}"
     if png:
         from mdfconv.reports.furnace_figure import draw_albedo
-        from mdfconv.reports.text import write_files
 
-        curve = {title.removeprefix("White furnace: "): [row["albedo"] for row in rows]}
-        cosines = [row["cos_theta"] for row in rows]
-        write_files({png: draw_albedo(cosines, {"": curve})})
-        typer.echo(f"mdfconv: wrote {png}", err=True)
-    write_records(list(rows[0]), rows, format_, output, title)
+        curve = {label: [row["albedo"] for row in rows]}
+        write_named({png: draw_albedo([row["cos_theta"] for row in rows], {"": curve})})
+    write_table(list(rows[0]), rows, format_, output, title=f"White furnace: {label}")
 
 
 def _rows(
     model: FurnaceModel, cosine: Array, samples: int | None, seed: int
 ) -> list[dict[str, Any]]:
     from mdfconv.brdf.furnace import directional_albedo, sampled_albedo
-    from mdfconv.reports.text import rounded_rows
+    from mdfconv.output.records import rounded_rows
 
     columns = {"cos_theta": cosine, "albedo": directional_albedo(model, cosine)}
     if samples:
@@ -125,10 +122,9 @@ def _rows(
     return rounded_rows(columns)
 
 
-def _write_speed(exponent: float, form: Any, output: Path | None) -> None:
+def _write_speed(exponent: float, form: Format | None, output: Path | None) -> None:
     from mdfconv.benchmark.normalizers import normalizer_speeds
 
     rows = normalizer_speeds(exponent)
-    write_records(
-        list(rows[0]), rows, form, output, f"Normalizers of modified Phong, γ = {exponent:g}"
-    )
+    title = f"Normalizers of modified Phong, γ = {exponent:g}"
+    write_table(list(rows[0]), rows, form, output, title=title)

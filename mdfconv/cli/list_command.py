@@ -2,36 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-from enum import StrEnum
-from typing import Annotated, Any
+from typing import Any
 
-import typer
-
-from mdfconv.cli.output import console
+from mdfconv.cli.options import Format, FormatOption
+from mdfconv.cli.tables import console, form_of, write_table
 from mdfconv.distributions import Distribution, list_distributions
-from mdfconv.distributions.base import AnisotropicDistribution
-from mdfconv.distributions.gtr import GTR
 from mdfconv.distributions.parameter import Parameter
-from mdfconv.reports.text import json_text
 
 
-class ListFormat(StrEnum):
-    """The forms in which `list` writes the distributions."""
-
-    table = "table"
-    plain = "plain"
-    json = "json"
-
-
-def command(
-    format_: Annotated[
-        ListFormat | None,
-        typer.Option(
-            "--format", help="Form of the output: table on a terminal, plain names in a pipe."
-        ),
-    ] = None,
-) -> None:
+def command(format_: FormatOption = None) -> None:
     """List the distributions: names, parameters, ranges, formulas and sources.
 
     Examples:
@@ -40,26 +19,25 @@ def command(
 
     mdfconv list --format json
     """
-    form = format_ or (ListFormat.table if sys.stdout.isatty() else ListFormat.plain)
-    if form is ListFormat.json:
-        typer.echo(json_text([_record(entry) for entry in list_distributions()]))
-    elif form is ListFormat.plain:
-        typer.echo("\n".join(entry.name for entry in list_distributions()))
+    form = form_of(format_, in_pipe=Format.plain)
+    records = [_record(mdf) for mdf in list_distributions()]
+    if form is Format.table:
+        console().print(_table(records))
     else:
-        console().print(_table())
+        columns = ["name"] if form is Format.plain else list(records[0])
+        write_table(columns, records, form)
 
 
-def _record(entry: Distribution) -> dict[str, Any]:
-    parameters = [entry.parameter, *([entry.exponent] if isinstance(entry, GTR) else [])]
+def _record(mdf: Distribution) -> dict[str, Any]:
     return {
-        "name": entry.name,
-        "aliases": entry.aliases,
-        "anisotropic": isinstance(entry, AnisotropicDistribution),
-        "parameters": [_parameter(parameter) for parameter in parameters],
-        "encodings": {encoding.name: encoding.formula for encoding in entry.encodings},
-        "unit_form": entry.unit_formula,
-        "normalized_form": entry.normalized_formula,
-        "source": entry.source,
+        "name": mdf.name,
+        "aliases": mdf.aliases,
+        "anisotropic": mdf.anisotropic,
+        "parameters": [_parameter(parameter) for parameter in mdf.parameters],
+        "encodings": {encoding.name: encoding.formula for encoding in mdf.encodings},
+        "unit_form": mdf.unit_formula,
+        "normalized_form": mdf.normalized_formula,
+        "source": mdf.source,
     }
 
 
@@ -68,11 +46,12 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
         "name": parameter.name,
         "symbol": parameter.symbol,
         "legal": parameter.legal,
-        "usual": parameter.usual,
+        "typical": list(parameter.typical),
+        "larger_is_smoother": parameter.larger_is_smoother,
     }
 
 
-def _table() -> Any:
+def _table(records: list[dict[str, Any]]) -> Any:
     from rich import box
     from rich.table import Table
 
@@ -80,19 +59,19 @@ def _table() -> Any:
     table.add_column("name", style="bold", no_wrap=True)
     for heading in ("aliases", "parameter", "unit form D̄", "source"):
         table.add_column(heading)
-    for entry in list_distributions():
-        record = _record(entry)
+    for record in records:
         parameters = "; ".join(
-            f"{parameter['name']}: {parameter['legal']}, usual {parameter['usual']}"
+            f"{parameter['name']}: {parameter['legal']}, typically "
+            f"{parameter['typical'][0]:g} to {parameter['typical'][1]:g}"
             for parameter in record["parameters"]
         )
-        encodings = f"; encodings: {', '.join(record['encodings'])}" * bool(entry.encodings)
+        encodings = f"; encodings: {', '.join(record['encodings'])}" * bool(record["encodings"])
         pair = "; or a pair X,Y" * record["anisotropic"]
         table.add_row(
-            entry.name,
-            ", ".join(entry.aliases),
+            record["name"],
+            ", ".join(record["aliases"]),
             parameters + pair + encodings,
-            entry.unit_formula,
-            entry.source,
+            record["unit_form"],
+            record["source"],
         )
     return table

@@ -9,14 +9,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli.options import ExposureOption, MetricOption, chosen_metric
+from mdfconv.cli.tables import progress, rich_table, tell
 from mdfconv.errors import MdfconvError
+from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
+    from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.mtl import Material, MtlConversion
-    from mdfconv.scene.mtl_files import Place
+    from mdfconv.scene.mtl_files import Destination
 
 # Longer tables are cut on the screen; JSON has every row.
 _ROWS_SHOWN = 100
+_PIPE_WIDTH = 160
 
 
 class ReportFormat(StrEnum):
@@ -43,14 +48,8 @@ def command(
             metavar="WHAT", help="roughness (Pr from Ns) or shininess (Ns from Pr, the inverse)."
         ),
     ] = "roughness",
-    metric: Annotated[
-        str,
-        typer.Option(
-            metavar="METRIC",
-            help="What is kept: energy (the light), display (the picture on a screen) or unit "
-            "(the shape of the lobe).",
-        ),
-    ] = "energy",
+    metric: MetricOption = "energy",
+    exposure: ExposureOption = None,
     replace: Annotated[
         bool, typer.Option("--replace", help="Drop the statement that was converted.")
     ] = False,
@@ -95,132 +94,131 @@ def command(
 
     mdfconv mtl --to shininess chair-pbr.mtl -o chair-phong.mtl
     """
-    from mdfconv.fitting.metrics import metric as find_metric
     from mdfconv.scene.mtl import convert_mtl
-    from mdfconv.scene.mtl_files import find_libraries, place_outputs, read_library, write_libraries
+    from mdfconv.scene.mtl_files import (
+        choose_outputs,
+        find_libraries,
+        read_library,
+        write_libraries,
+    )
 
     wanted = to.strip().lower()
     if wanted != "roughness" and (compare or textures):
         raise MdfconvError("--compare and --textures go with --to roughness")
-    measure = find_metric(metric)
-    found = []
+    kept = chosen_metric(metric, exposure)
+    converted = []
     problems: list[tuple[Path, int, str]] = []
-    for place in place_outputs(find_libraries(libraries), output, in_place=in_place):
-        data = read_library(place.source)
+    for destination in choose_outputs(find_libraries(libraries), output, in_place=in_place):
+        data = read_library(destination.source)
         names: dict[str, str] = {}
         if textures:
-            names, failed = _convert_textures(place, data, metric, exponent_max)
-            problems += [(place.source, *problem) for problem in failed]
-        conversion = convert_mtl(data, wanted, metric=measure, replace=replace, texture_names=names)
-        found.append((place, data, conversion))
-    written = write_libraries(found)
-    _report(found, measure, form=format_, compare=compare)
-    for place, _, conversion in found:
-        problems += [(place.source, *problem) for problem in conversion.problems]
-        done = "wrote" if place in written else "nothing to change in"
-        typer.echo(f"mdfconv: {done} {place.output}", err=True)
+            names, failures = _convert_textures(destination, data, kept, exponent_max)
+            problems += [(destination.source, *failure) for failure in failures]
+        conversion = convert_mtl(data, wanted, metric=kept, replace=replace, texture_names=names)
+        converted.append((destination, data, conversion))
+    written = write_libraries(converted)
+    _report(converted, kept, form=format_, compare=compare)
+    for destination, _, conversion in converted:
+        problems += [(destination.source, *problem) for problem in conversion.problems]
+        tell(
+            f"{'wrote' if destination in written else 'nothing to change in'} {destination.output}"
+        )
     for path, line, text in problems:
-        typer.echo(f"mdfconv: {path}:{line}: {text}: left as it is", err=True)
+        tell(f"{path}:{line}: {text}: left as it is")
     if problems:
         raise typer.Exit(1)
 
 
 def _convert_textures(
-    place: Place, data: bytes, metric: str, exponent_max: float
+    destination: Destination, data: bytes, metric: Metric, exponent_max: float
 ) -> tuple[dict[str, str], list[tuple[int, str]]]:
     """Convert the textures of a library; return their new names, and problems by line."""
-    from mdfconv.cli.output import progress
     from mdfconv.scene.mtl import texture_statements
     from mdfconv.scene.mtl_textures import convert_textures
 
     textures = texture_statements(data)
+    paths = destination.source, destination.output
     with progress("Textures", len(textures)) as advance:
-        return convert_textures(textures, place.source, place.output, metric, exponent_max, advance)
+        return convert_textures(textures, *paths, metric, exponent_max, advance)
 
 
 def _report(
-    found: list[tuple[Place, bytes, MtlConversion]],
-    measure: Any,
+    converted: list[tuple[Destination, bytes, MtlConversion]],
+    metric: Metric,
     *,
     form: ReportFormat,
     compare: bool,
 ) -> None:
-    from mdfconv.reports.text import json_text
+    from mdfconv.scene.shininess import IMPORTER_RULES
 
     records = [
         {
-            "file": str(place.source),
-            "output": str(place.output),
-            "metric": measure.name,
-            "materials": _rows(conversion.materials, measure, compare=compare),
+            "file": str(destination.source),
+            "output": str(destination.output),
+            "metric": str(metric),
+            "materials": _rows(conversion.materials, metric, compare=compare),
             "textures": [vars(texture) for texture in conversion.textures],
             "problems": [{"line": line, "problem": text} for line, text in conversion.problems],
         }
-        for place, _, conversion in found
+        for destination, _, conversion in converted
     ]
     if form is ReportFormat.json:
         typer.echo(json_text(records))
         return
     for record in records:
-        _print_table(record)
+        _print_table(record, list(IMPORTER_RULES) if compare else [])
 
 
-def _rows(materials: tuple[Material, ...], measure: Any, *, compare: bool) -> list[dict[str, Any]]:
+def _rows(
+    materials: tuple[Material, ...], metric: Metric, *, compare: bool
+) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = [
         vars(material) | {"notes": list(material.notes)} for material in materials
     ]
     if compare:
         import numpy as np
 
-        from mdfconv.scene.shininess import IMPORTER_RULES, error_of, importer_roughness
+        from mdfconv.scene.shininess import importer_results
 
         exponents = np.array([material.shininess for material in materials])
-        for rule in IMPORTER_RULES:
-            given = importer_roughness(rule, exponents)
-            errors = error_of(exponents, given, measure)
-            for row, roughness, error in zip(rows, given.tolist(), errors.tolist(), strict=True):
-                row[rule] = {"roughness": roughness, "rmse": error}
+        for row, results in zip(rows, importer_results(exponents, metric), strict=True):
+            row |= {r.rule: {"roughness": r.roughness, "rmse": r.rmse} for r in results}
     return rows
 
 
-def _print_table(record: dict[str, Any]) -> None:
+def _print_table(record: dict[str, Any], rules: list[str]) -> None:
     """Print what was converted to standard error."""
-    from rich import box
     from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
 
     rows = record["materials"]
-    rules = [key for key in (rows[0] if rows else ()) if key.startswith("1 -")]
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        title=f"{record['file']}, {record['metric']} metric",
-        title_style="bold",
-        title_justify="left",
-    )
-    for heading in ("material", "Ns", "Pr", "RMSE", *rules, "notes"):
-        table.add_column(heading, justify="left" if heading in ("material", "notes") else "right")
-    for row in rows[:_ROWS_SHOWN]:
-        numbers = (row["shininess"], row["roughness"])
-        table.add_row(
-            escape(row["name"]),
-            *("—" if math.isnan(number) else f"{number:.6g}" for number in numbers),
-            "—" if math.isnan(row["rmse"]) else f"{row['rmse']:.3g}",
-            *(f"{row[rule]['roughness']:.3g} ({_error(row[rule]['rmse'])})" for rule in rules),
-            "; ".join(row["notes"]),
-        )
-    out = Console(stderr=True, width=None if Console(stderr=True).is_terminal else 160)
-    if rows:
-        out.print(table)
+    shown = [
+        {
+            "material": row["name"],
+            "Ns": _number(row["shininess"], 6),
+            "Pr": _number(row["roughness"], 6),
+            "RMSE": _number(row["rmse"], 3),
+            **{rule: _importer(row[rule]) for rule in rules},
+            "notes": "; ".join(row["notes"]),
+        }
+        for row in rows[:_ROWS_SHOWN]
+    ]
+    out = Console(stderr=True, width=None if Console(stderr=True).is_terminal else _PIPE_WIDTH)
+    if shown:
+        title = f"{record['file']}, {record['metric']} metric"
+        out.print(rich_table(list(shown[0]), shown, title, right=["Ns", "Pr", "RMSE", *rules]))
     else:
         out.print(f"{record['file']}: nothing to convert", highlight=False)
     if len(rows) > _ROWS_SHOWN:
-        out.print(
-            f"… and {len(rows) - _ROWS_SHOWN} more; --format json has them all", highlight=False
-        )
+        more = f"… and {len(rows) - _ROWS_SHOWN} more; --format json has them all"
+        out.print(more, highlight=False)
     for texture in record["textures"]:
         typer.echo(f"{texture['keyword']} {texture['file']} (line {texture['line']})", err=True)
 
 
-def _error(rmse: float) -> str:
-    return "a mirror" if rmse == float("inf") else f"{rmse:.2g}"
+def _number(value: float, digits: int) -> str:
+    return "—" if math.isnan(value) else f"{value:.{digits}g}"
+
+
+def _importer(result: dict[str, float]) -> str:
+    mirror = math.isinf(result["rmse"])
+    return f"{result['roughness']:.3g} ({'a mirror' if mirror else _number(result['rmse'], 2)})"

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from mdfconv.cli.output import progress
+from mdfconv.cli.options import FolderOption
+from mdfconv.cli.tables import progress
 
 
 def command(
-    output: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write to.")] = Path(
-        "reports"
-    ),
+    output: FolderOption = None,
 ) -> None:
     """Write every table and figure, and an index (README.md) that says what each one is.
 
@@ -25,9 +23,10 @@ def command(
     """
     from mdfconv.reports.build import COUNT, build
 
+    folder = output or Path("reports")
     written: list[str] = []
     with progress("Report", COUNT) as advance:
-        for artefact in build(output):
-            written += [str(output / name) for name in artefact.files]
+        for artefact in build(folder):
+            written += [str(folder / name) for name in artefact.files]
             advance(1)
-    typer.echo("\n".join([*written, str(output / "README.md")]))
+    typer.echo("\n".join([*written, str(folder / "README.md")]))

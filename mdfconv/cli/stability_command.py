@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli.output import FileOption, FormOption, write_records
+from mdfconv.cli.options import FormatOption, MdfOption, OutputOption
+from mdfconv.cli.tables import write_table
 
 
 class Part(StrEnum):
@@ -18,12 +19,9 @@ class Part(StrEnum):
 
 
 def command(
-    format_: FormOption = None,
-    output: FileOption = None,
-    mdf: Annotated[
-        list[str] | None,
-        typer.Option("--mdf", metavar="MDF", help="Only this distribution; repeatable."),
-    ] = None,
+    format_: FormatOption = None,
+    output: OutputOption = None,
+    mdf: MdfOption = None,
     part: Annotated[Part | None, typer.Option(help="Only this part.")] = None,
 ) -> None:
     """Audit the hard cases: errors against 50-digit values, beside those of the printed formulas.
@@ -50,4 +48,4 @@ def command(
 
     rows = [asdict(finding) for finding in audit(mdf or (), part)]
     columns = [field.name for field in fields(Finding)]
-    write_records(columns, rows, format_, output, "Hard cases: worst relative errors")
+    write_table(columns, rows, format_, output, title="Hard cases: worst relative errors")

@@ -8,8 +8,17 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli.folder import check_folder
-from mdfconv.cli.output import progress
+from mdfconv.cli.options import (
+    ExposureOption,
+    GammaOption,
+    MethodOption,
+    MetricOption,
+    PngOption,
+    chosen_metric,
+    fixed_gamma,
+)
+from mdfconv.cli.outputs import check_outputs, write_named
+from mdfconv.cli.tables import progress, tell
 
 
 class Depth(StrEnum):
@@ -46,16 +55,10 @@ def command(
             help="r, g, b, a or l (grey), in OpenEXR its name; needed if there are several.",
         ),
     ] = None,
-    method: Annotated[
-        str, typer.Option(metavar="METHOD", help="As for convert, but fast by default.")
-    ] = "fast",
-    metric: Annotated[
-        str,
-        typer.Option(metavar="METRIC", help="What fast and fit keep: unit, energy or display."),
-    ] = "unit",
-    exposure: Annotated[
-        float, typer.Option(metavar="E", help="Exposure for the display metric.")
-    ] = 1.0,
+    method: MethodOption = "fast",
+    metric: MetricOption = "unit",
+    exposure: ExposureOption = None,
+    gamma: GammaOption = None,
     exponent_max: Annotated[
         float, typer.Option(metavar="N", help="Exponent of the brightest texel, for exponent.")
     ] = 1000.0,
@@ -73,9 +76,7 @@ def command(
         int | None,
         typer.Option(metavar="N", min=1, help="Largest picture to decode; default Pillow's limit."),
     ] = None,
-    png: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw histograms before and after.")
-    ] = None,
+    png: PngOption = None,
 ) -> None:
     """Convert a roughness texture, texel by texel.
 
@@ -91,15 +92,20 @@ def command(
 
     mdfconv texture orm.png -o new.png --channel g --from ggx:roughness --to ggx:alpha --depth 16
     """
-    from mdfconv.reports.text import write_files
-    from mdfconv.scene.image_files import check_place
     from mdfconv.scene.texture import convert_texture_file
     from mdfconv.scene.texture_rule import TextureRule
 
     if png:
-        check_place(png, source_file, output)
-        check_folder(png.parent)
-    rule = TextureRule(source, target, method, metric, exposure, exponent_max, log2_scale)
+        check_outputs(png, output, inputs=[source_file])
+    rule = TextureRule(
+        source,
+        target,
+        method or "fast",
+        str(chosen_metric(metric, exposure)),
+        exponent_max,
+        log2_scale,
+        fixed_gamma(gamma),
+    )
     report = convert_texture_file(
         source_file,
         output,
@@ -112,10 +118,9 @@ def command(
         progress=progress,
     )
     for note in report.notes():
-        typer.echo(f"mdfconv: note: {note}", err=True)
-    typer.echo(f"mdfconv: wrote {output}", err=True)
+        tell(f"note: {note}")
+    tell(f"wrote {output}")
     if png:
         from mdfconv.scene.texture_figure import draw_histograms
 
-        write_files({png: draw_histograms(report, f"{source_file.name} → {output.name}")})
-        typer.echo(f"mdfconv: wrote {png}", err=True)
+        write_named({png: draw_histograms(report, f"{source_file.name} → {output.name}")})

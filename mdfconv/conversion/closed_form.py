@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mdfconv.conversion.formulas import Formula, FormulaMethod
+from mdfconv.conversion.equivalence import Formula, follow, from_root, to_root
+from mdfconv.conversion.formulas import FormulaMethod
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.parameter import number_text
 from mdfconv.fitting.metrics import Metric
@@ -12,15 +13,10 @@ from mdfconv.fitting.metrics import Metric
 # What the paper's sweep m_B ∈ [0.0044, 0.4473] (its Table 2) covers, in each parameter.
 _SWEEP = {
     "beckmann": (0.0044, 0.4473),
-    "schlick": (0.0044, 0.4473),
     "gauss": (0.0044, 0.4970),
     "blinn-phong": (10.0, 1e5),
-    "ashikhmin-shirley": (10.0, 1e5),
     "sawicki": (9.218, 117400.0),
     "ggx": (0.005364, 0.4865),
-    "gtr": (0.005364, 0.4865),
-    # 0.005364 and 0.4865 in Smoothie's parameter.
-    "smoothie": (0.010728, 1.11367),
 }
 
 
@@ -75,6 +71,13 @@ _FORMULAS = {
 }
 
 
+def _sweep(source: Distribution) -> list[float]:
+    """Return the ends of the paper's sweep in the parameter of a distribution."""
+    root, _ = to_root(source, same_lobe=False)
+    ends = np.array(_SWEEP[root.name])
+    return [float(f"{end:.6g}") for end in follow(from_root(source, same_lobe=False), ends)]
+
+
 class ClosedForm(FormulaMethod):
     """The paper's formulas, fitted by it to Table 2: they keep the shape of the lobe.
 
@@ -93,15 +96,15 @@ class ClosedForm(FormulaMethod):
         self, parameter: float, result: float, source: Distribution, target: Distribution
     ) -> list[str]:
         """Add to the turning points whether the source is outside the paper's sweep."""
-        found = super().cautions(parameter, result, source, target)
-        lower, upper = _SWEEP.get(source.name, (0.0, np.inf))
+        cautions = super().cautions(parameter, result, source, target)
+        lower, upper = _sweep(source)
         if not lower <= parameter <= upper:
-            found.insert(
+            cautions.insert(
                 0,
                 f"outside the paper's sweep: its formulas were fitted for {source.name} "
                 f"{source.parameter.symbol} from {number_text(lower)} to {number_text(upper)}",
             )
-        return found
+        return cautions
 
 
 METHOD = ClosedForm(_FORMULAS, through={"sawicki": "blinn-phong"})

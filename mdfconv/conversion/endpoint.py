@@ -1,18 +1,17 @@
-"""One side of a conversion: a distribution and the encoding of its parameter."""
+"""One end of a conversion: a distribution and the encoding of its parameter."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
-from mdfconv.distributions.gtr import GTR
 from mdfconv.distributions.parameter import Encoding, Parameter
-from mdfconv.errors import MdfconvError, check_name, unknown_name
+from mdfconv.errors import MdfconvError
+from mdfconv.registry import unknown_name
 
 DEFAULT_ENCODING = "alpha"
 
@@ -24,7 +23,7 @@ class Endpoint:
     Parameters
     ----------
     distribution : Distribution
-        The distribution; for GTR with its γ.
+        The distribution, with its γ if it has one.
     encoding : Encoding or None
         The stored form; None for the parameter itself.
     """
@@ -40,7 +39,7 @@ class Endpoint:
 
     @property
     def stored(self) -> Parameter:
-        """Name, symbol and range of the number that the user gives or gets."""
+        """Name, symbol and ranges of the number that the user gives or gets."""
         return self.encoding.stored if self.encoding else self.distribution.parameter
 
     def decode(self, values: ArrayLike) -> Array:
@@ -70,15 +69,13 @@ class Endpoint:
         return np.where(self.stored.accepts(stored), stored, np.nan)
 
 
-def endpoint(name: str | Endpoint, gamma: float | None = None) -> Endpoint:
+def endpoint(name: str | Endpoint) -> Endpoint:
     """Return the endpoint for a name such as ``"ggx"`` or ``"ggx:roughness"``.
 
     Parameters
     ----------
     name : str or Endpoint
         Distribution, with an encoding after a colon if it is not the parameter itself.
-    gamma : float, optional
-        γ for GTR; other distributions ignore it.
 
     Raises
     ------
@@ -87,16 +84,55 @@ def endpoint(name: str | Endpoint, gamma: float | None = None) -> Endpoint:
     """
     if isinstance(name, Endpoint):
         return name
-    head, colon, tail = check_name("distribution", name).partition(":")
-    found = distribution(head)
-    if gamma is not None and isinstance(found, GTR):
-        found = GTR(gamma)
-    return Endpoint(found, _encoding(found, tail) if colon else None)
+    if not isinstance(name, str):
+        raise MdfconvError(f"a distribution is named by a string, not {name!r}")
+    head, colon, tail = name.partition(":")
+    owner = distribution(head)
+    return Endpoint(owner, _encoding(owner, tail) if colon else None)
+
+
+def endpoints(
+    source: str | Endpoint, target: str | Endpoint, gamma: float | None = None
+) -> tuple[Endpoint, Endpoint]:
+    """Return both ends of a conversion.
+
+    Parameters
+    ----------
+    source, target : str or Endpoint
+        As for `endpoint`.
+    gamma : float, optional
+        The second parameter, for each end that has one; its default if not given.
+
+    Raises
+    ------
+    MdfconvError
+        As `endpoint`, and if γ is illegal or neither end has one.
+    """
+    first, last = endpoint(source), endpoint(target)
+    if gamma is None:
+        return first, last
+    second = [end.distribution.second_parameter for end in (first, last)]
+    if not any(second):
+        raise MdfconvError(
+            f"neither {first.distribution.name} nor {last.distribution.name} has a second "
+            "parameter γ"
+        )
+    return (
+        with_gamma(first, gamma) if second[0] else first,
+        with_gamma(last, gamma) if second[1] else last,
+    )
+
+
+def with_gamma(end: Endpoint, gamma: float | None) -> Endpoint:
+    """Return an endpoint with another γ; raise `MdfconvError` if it has none or it is illegal."""
+    if gamma is None:
+        return end
+    return replace(end, distribution=end.distribution.with_gamma(gamma))
 
 
 def _encoding(owner: Distribution, name: str) -> Encoding | None:
     key = name.strip().lower()
-    known = {entry.name: entry for entry in owner.encodings}
+    known = {encoding.name: encoding for encoding in owner.encodings}
     if not known:
         raise MdfconvError(
             f"{owner.name} has no encoding '{name}': its {owner.parameter.name} "
@@ -107,9 +143,3 @@ def _encoding(owner: Distribution, name: str) -> Encoding | None:
     if key not in known:
         raise unknown_name(f"encoding of {owner.name}", name, [DEFAULT_ENCODING, *known])
     return known[key]
-
-
-def same_family(source: Any, target: Any) -> bool:
-    """Return whether two distributions take the same parameter for the same lobe."""
-    gammas = [side.gamma if isinstance(side, GTR) else None for side in (source, target)]
-    return bool(source.name == target.name and gammas[0] == gammas[1])

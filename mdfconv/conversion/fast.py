@@ -1,112 +1,37 @@
 """The answer of the fit at the price of a closed form: stored polynomials.
 
-A lobe is described by x, which for a smooth surface is its roughness and stays below 1: the
-parameter itself for Beckmann, Gauss, GGX and Schlick, √(2/(N+2)) for Blinn/Phong,
-√(8/(3N+9)) for Sawicki. For each pair and metric the product x² k of the fit is a
-smooth function of x, where k falls to 0 as the target's lobe becomes uniform; where source and
-target become uniform together, x² k/(1−x²) is. Both are stored as polynomials on a few pieces,
-made from the fit by ``python -m tests.generate_fast``, with the error that the fit leaves.
+A lobe is described by x, which for a smooth surface is its roughness and stays below 1, and by
+its concentration κ, about 1/x² and 0 for a uniform lobe (`MapVariables` of the distributions).
+For each pair and metric the product x² κ of the source's x and the fit's κ is a smooth function
+of x; where source and target become uniform together, x² κ/(1−x²) is. Both are stored as
+polynomials on a few pieces, made from the fit by ``python -m tests.generate_fast``, with the
+error that the fit leaves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from mdfconv.conversion.equivalence import Formula, follow, from_root, to_root
 from mdfconv.conversion.method import Method
 from mdfconv.distributions import Distribution
+from mdfconv.distributions.declarations import MapVariables
 from mdfconv.distributions.evaluation import Array
-from mdfconv.distributions.gtr import GTR
-from mdfconv.distributions.smoothie import to_ggx
-from mdfconv.fitting.metrics import Display, Metric
+from mdfconv.fitting.metrics import Metric
 
 DATA = "fast.npz"
 # Where the errors are stored, as shares of the largest x of a map: between lobes that become alike
 # as they become smooth they fall like a power of x.
-ERROR_PLACES = np.union1d(np.geomspace(1e-4, 1, 49), np.linspace(0, 1, 49)[1:])
+ERROR_SHARES = np.union1d(np.geomspace(1e-4, 1, 49), np.linspace(0, 1, 49)[1:])
+# So many values and their intermediates stay in the cache.
 _BLOCK = 8192
+# A logarithm is interpolated: an error below this is none.
 _NO_ERROR = 1e-30
-
-
-@dataclass(frozen=True)
-class Side:
-    """A distribution as the maps see it.
-
-    Parameters
-    ----------
-    lobe : str
-        The distribution whose lobes it has in another parameter, or itself.
-    reach : callable
-        x for a parameter.
-    parameter : callable
-        The parameter for x and x² k.
-    excess : callable
-        k for a parameter.
-    can_be_uniform : bool
-        Whether k = 0 is the uniform lobe and relative precision there matters.
-    """
-
-    lobe: str
-    reach: Callable[[Array], Array]
-    parameter: Callable[[Array, Array], Array]
-    excess: Callable[[Array], Array]
-    can_be_uniform: bool = False
-
-
-def _identity(parameter: Array) -> Array:
-    return parameter
-
-
-def _alpha(x: Array, product: Array) -> Array:
-    return np.minimum(x / np.sqrt(x * x + product), 1)
-
-
-def _alpha_excess(alpha: Array) -> Array:
-    return (1 - alpha) * (1 + alpha) / (alpha * alpha)
-
-
-def _exponent(x: Array, product: Array) -> Array:
-    return product / (x * x)
-
-
-_BLINN_PHONG = Side(
-    "blinn-phong", lambda n: np.sqrt(2 / (n + 2)), _exponent, _identity, can_be_uniform=True
-)
-_GGX = Side("ggx", _identity, _alpha, _alpha_excess, can_be_uniform=True)
-SIDES = {
-    "beckmann": Side(
-        "beckmann", _identity, lambda x, product: x / np.sqrt(x * x + product), _alpha_excess
-    ),
-    "gauss": Side(
-        "gauss",
-        _identity,
-        lambda x, product: x / np.sqrt(product),
-        lambda m: 1 / (m * m),
-        can_be_uniform=True,
-    ),
-    "ggx": _GGX,
-    "gtr": _GGX,
-    "blinn-phong": _BLINN_PHONG,
-    "ashikhmin-shirley": _BLINN_PHONG,
-    "schlick": Side("schlick", _identity, _alpha, _alpha_excess),
-    "sawicki": Side("sawicki", lambda n: np.sqrt(8 / (3 * n + 9)), _exponent, _identity),
-    "smoothie": Side(
-        "ggx",
-        to_ggx,
-        lambda x, product: 2 * x / np.sqrt(product),
-        lambda alpha: 4 / (alpha * alpha),
-        can_be_uniform=True,
-    ),
-}
-
-
-def uniform_together(source: str, target: str) -> bool:
-    """Return whether both lobes become uniform at x = 1, so that x² k/(1−x²) is stored."""
-    return source in ("ggx", "schlick") and SIDES[target].can_be_uniform
 
 
 @dataclass(frozen=True)
@@ -120,15 +45,18 @@ class Map:
     coefficients : tuple of numpy.ndarray
         For each piece those of a polynomial in z, which runs from −1 to 1, constant first.
     errors : numpy.ndarray, shape (2, n)
-        RMSE and maximum error of the conversion at ERROR_PLACES.
+        RMSE and maximum error of the conversion at ERROR_SHARES.
+    factored : bool
+        Whether both lobes become uniform at x = 1, so that x² κ/(1−x²) is stored.
     """
 
     edges: Array
     coefficients: tuple[Array, ...]
     errors: Array
+    factored: bool
 
     def __call__(self, x: Array) -> Array:
-        """Return the stored function at x, shape (n,); NaN outside the range."""
+        """Return x² κ at x, shape (n,); NaN outside the range."""
         value = np.full_like(x, np.nan)
         for low, high, piece in zip(
             self.edges[:-1], self.edges[1:], self.coefficients, strict=True
@@ -137,6 +65,8 @@ class Map:
             if inside.size:
                 z = (x[inside] - 0.5 * (low + high)) * (2 / (high - low))
                 value[inside] = _horner(piece, z)
+        if self.factored:
+            value *= (1 - x) * (1 + x)
         return value
 
 
@@ -151,39 +81,68 @@ def _horner(coefficients: Array, z: Array) -> Array:
 def pack(maps: dict[str, Map]) -> dict[str, Array]:
     """Return maps as the arrays of the data file."""
     every = list(maps.values())
-    pieces = [piece for entry in every for piece in entry.coefficients]
+    pieces = [piece for stored in every for piece in stored.coefficients]
     return {
         "names": np.array(list(maps)),
-        "pieces": np.array([len(entry.coefficients) for entry in every]),
+        "factored": np.array([stored.factored for stored in every]),
+        "pieces": np.array([len(stored.coefficients) for stored in every]),
         "terms": np.array([piece.size for piece in pieces]),
-        "edges": np.concatenate([entry.edges for entry in every]),
+        "edges": np.concatenate([stored.edges for stored in every]),
         "coefficients": np.concatenate(pieces),
-        "errors": np.stack([entry.errors for entry in every]).astype(np.float32),
+        "errors": np.stack([stored.errors for stored in every]).astype(np.float32),
     }
 
 
 @cache
 def load() -> dict[str, Map]:
     """Return the stored maps; their names are metric, source and target between blanks."""
-    with np.load(Path(__file__).parent / "data" / DATA) as stored:
-        content = {name: stored[name] for name in stored.files}
+    with np.load(Path(__file__).parent / "data" / DATA) as file:
+        content = {name: file[name] for name in file.files}
     terms = np.split(content["coefficients"], np.cumsum(content["terms"])[:-1])
     pieces = content["pieces"]
     firsts = np.cumsum(pieces) - pieces
     edges = np.split(content["edges"], np.cumsum(pieces + 1)[:-1])
+    columns = (content["names"], edges, firsts, pieces, content["errors"], content["factored"])
     return {
-        str(name): Map(edge, tuple(terms[first : first + count]), errors)
-        for name, edge, first, count, errors in zip(
-            content["names"], edges, firsts, pieces, content["errors"], strict=True
-        )
+        str(name): Map(edge, tuple(terms[first : first + count]), errors, bool(factored))
+        for name, edge, first, count, errors, factored in zip(*columns, strict=True)
     }
+
+
+@cache
+def _stored_metrics() -> frozenset[str]:
+    return frozenset(name.split()[0] for name in load())
+
+
+@dataclass(frozen=True)
+class _Stored:
+    """A map with the variables of its ends."""
+
+    source: MapVariables
+    target: MapVariables
+    map: Map
+
+
+def _stored(source: Distribution, target: Distribution, metric: str) -> _Stored | None:
+    """Return the map of a pair under a metric, if there is one.
+
+    A distribution that is another one in another parameter has that one's maps, as a target its
+    own if they are stored.
+    """
+    first, _ = to_root(source, same_lobe=True)
+    root, _ = to_root(target, same_lobe=True)
+    for last in (target, root):
+        stored = load().get(f"{metric} {first.name} {last.name}")
+        if stored and first.map_variables and last.map_variables:
+            return _Stored(first.map_variables, last.map_variables, stored)
+    return None
 
 
 class Fast(Method):
     """The least-squares fit from stored polynomials: 1e-6 from it, 1e-4 for a display.
 
     Covers the usual range of the source (N from 0.1) as far as the fit does and the target
-    stays usable. The display metric is stored for exposure 1.
+    stays usable, under the metrics for which there are maps.
     """
 
     name = "fast"
@@ -197,44 +156,28 @@ class Fast(Method):
 
     def covers_metric(self, metric: Metric) -> bool:
         """Return whether there are maps: for the display metric at exposure 1 only."""
-        return not isinstance(metric, Display) or metric.exposure == 1
+        return str(metric) in _stored_metrics()
 
     def route(self, source: Distribution, target: Distribution) -> tuple[str, ...] | None:
         """Return the one step; None for distributions without maps, such as GTR."""
-        if _side(source) and _side(target):
-            return () if self.is_exact(source, target) else ("stored least squares",)
-        return None
-
-    def is_exact(self, source: Distribution, target: Distribution) -> bool:
-        """Return whether both are one form in two parameters, such as smoothie and ggx."""
-        first, last = _side(source), _side(target)
-        return first is not None and last is not None and first.lobe == last.lobe
+        stored = any(_stored(source, target, metric) for metric in _stored_metrics())
+        return ("stored least squares",) if stored else None
 
     def convert(
         self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
     ) -> Array:
         """Evaluate the polynomials; NaN outside their range."""
-        if self.is_exact(source, target):
-            if "smoothie" not in (source.name, target.name):
-                return parameter.copy()
-            result: Array = target.from_peak_alpha(source.peak_alpha(parameter))
-            return result
-        found = _map(source, target, metric)
-        first, last = SIDES[source.name], SIDES[target.name]
-        factored = uniform_together(first.lobe, target.name)
-        given = parameter.ravel()
-        answers = np.empty_like(given)
-        # Block by block the intermediates stay in the cache.
-        for start in range(0, given.size, _BLOCK):
+        stored, back = self._for(source, target, metric)
+        forward = to_root(source, same_lobe=True)[1]
+        values = parameter.ravel()
+        answers = np.empty_like(values)
+        for start in range(0, values.size, _BLOCK):
             block = slice(start, start + _BLOCK)
-            x = first.reach(given[block])
-            product = found(x)
-            if factored:
-                product *= (1 - x) * (1 + x)
-            answers[block] = last.parameter(x, product)
+            x = stored.source.width(follow(forward, values[block]))
+            answers[block] = follow(back, stored.target.from_map(x, stored.map(x)))
         return answers.reshape(parameter.shape)
 
-    def residual(
+    def remaining_error(
         self,
         parameter: Array,
         source: Distribution,
@@ -243,34 +186,31 @@ class Fast(Method):
         metric: Metric,
     ) -> tuple[Array, Array]:
         """Return RMSE and maximum error as stored with the polynomials."""
-        if self.is_exact(source, target) or self.route(source, target) is None:
-            return super().residual(parameter, source, result, target, metric)
-        found = _map(source, target, metric)
-        share = np.log(SIDES[source.name].reach(parameter) / found.edges[-1])
+        stored, _ = self._for(source, target, metric)
+        x = stored.source.width(follow(to_root(source, same_lobe=True)[1], parameter))
+        share = np.log(x / stored.map.edges[-1])
         rmse, maximum = (
-            np.exp(np.interp(share, np.log(ERROR_PLACES), np.log(np.maximum(errors, _NO_ERROR))))
-            for errors in found.errors
+            np.exp(np.interp(share, np.log(ERROR_SHARES), np.log(np.maximum(errors, _NO_ERROR))))
+            for errors in stored.map.errors
         )
         return rmse, maximum
 
     def range_text(self, source: Distribution, target: Distribution, metric: Metric) -> str:
         """Return which parameters of the source the stored maps cover."""
-        x = _map(source, target, metric).edges[-1]
-        end = x if source.name == "gauss" else source.from_peak_alpha(x)
-        rises = source.parameter.name.startswith("exponent")
-        return f"{source.parameter.symbol} {'≥' if rises else '≤'} {float(end):.6g}"
+        stored, _ = self._for(source, target, metric)
+        end = stored.source.from_width(np.asarray(stored.map.edges[-1]))
+        end = follow(from_root(source, same_lobe=True), end)
+        above = source.parameter.larger_is_smoother
+        return f"{source.parameter.symbol} {'≥' if above else '≤'} {float(end):.6g}"
 
-
-def _side(distribution: Distribution) -> Side | None:
-    if isinstance(distribution, GTR) and distribution.gamma != 2:
-        return None
-    return SIDES.get(distribution.name)
-
-
-def _map(source: Distribution, target: Distribution, metric: Metric) -> Map:
-    last = SIDES[target.name]
-    name = target.name if target.name == "smoothie" else last.lobe
-    return load()[f"{metric.name} {SIDES[source.name].lobe} {name}"]
+    def _for(
+        self, source: Distribution, target: Distribution, metric: Metric
+    ) -> tuple[_Stored, Sequence[Formula]]:
+        """Return the map of a pair that is covered, and the steps from its target back."""
+        stored = _stored(source, target, str(metric))
+        assert stored, "a pair that is covered has a map"
+        own = stored.target is target.map_variables
+        return stored, () if own else from_root(target, same_lobe=True)
 
 
 METHOD = Fast()

@@ -31,7 +31,7 @@ class LeastSquares(Method):
         self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
     ) -> Array:
         """Fit every value; NaN where the fit tends to the open end of the legal range."""
-        from mdfconv.fitting.core import fit
+        from mdfconv.fitting.fit import fit
 
         return fit(source, parameter.ravel(), target, metric).parameter.reshape(parameter.shape)
 
@@ -39,8 +39,8 @@ class LeastSquares(Method):
         self, parameter: float, result: float, source: Distribution, target: Distribution
     ) -> list[str]:
         """Say where the best fit is the end of the target's range."""
-        wanted = target.parameter
-        if wanted.upper_closed and result == wanted.upper:
+        limits = target.parameter
+        if limits.upper_closed and result == limits.upper:
             return [f"the best fit lies at the end of the legal range of {target.name}"]
         return []
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from mdfconv.conversion.residual import residual
+from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
@@ -47,7 +47,7 @@ class Method(ABC):
         """Return which parameters of the source a method with a range of its own covers."""
         return ""
 
-    def residual(
+    def remaining_error(
         self,
         parameter: Array,
         source: Distribution,
@@ -57,14 +57,10 @@ class Method(ABC):
     ) -> tuple[Array, Array]:
         """Return the RMSE and the maximum error of conversions, shapes (n,).
 
-        Both are those of `mdfconv.conversion.residual.residual`, which a method may know
-        without computing them.
+        Both are those of `mdfconv.conversion.remaining_error`, which a method may know without
+        computing them.
         """
-        return residual(source, parameter, target, result, metric)
-
-    def is_exact(self, source: Distribution, target: Distribution) -> bool:
-        """Return whether the target takes the very same form."""
-        return False
+        return remaining_error(source, parameter, target, result, metric)
 
     def cautions(
         self, parameter: float, result: float, source: Distribution, target: Distribution

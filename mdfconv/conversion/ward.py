@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mdfconv.conversion.formulas import Formula, FormulaMethod
+from mdfconv.conversion.equivalence import Formula
+from mdfconv.conversion.formulas import FormulaMethod
 from mdfconv.fitting.metrics import Metric
 
 

@@ -8,9 +8,17 @@ from __future__ import annotations
 from importlib import import_module
 
 from mdfconv.distributions.base import Distribution
-from mdfconv.errors import check_name, unknown_name
+from mdfconv.errors import MdfconvError
+from mdfconv.registry import Registry
 
-__all__ = ["Distribution", "distribution", "list_distributions"]
+__all__ = [
+    "Distribution",
+    "distribution",
+    "list_distributions",
+    "one_parameter_distribution",
+    "one_parameter_distributions",
+    "register",
+]
 
 _MODULES = (
     "beckmann",
@@ -22,17 +30,30 @@ _MODULES = (
     "schlick",
     "sawicki",
     "smoothie",
+    "student_t",
 )
 
-_ALL: tuple[Distribution, ...] = tuple(
-    import_module(f"{__name__}.{module}").DISTRIBUTION for module in _MODULES
-)
-_BY_NAME = {name: entry for entry in _ALL for name in (entry.name, *entry.aliases)}
+_REGISTRY: Registry[Distribution] = Registry("distribution")
+
+
+def register(mdf: Distribution) -> None:
+    """Add a distribution: every function and command that takes one knows it from here on.
+
+    Raises
+    ------
+    MdfconvError
+        If its name or an alias is taken.
+    """
+    _REGISTRY.add(mdf.name, mdf, mdf.aliases)
+
+
+for _module in _MODULES:
+    register(import_module(f"{__name__}.{_module}").DISTRIBUTION)
 
 
 def list_distributions() -> tuple[Distribution, ...]:
     """Return every distribution, in the order of the documentation."""
-    return _ALL
+    return tuple(_REGISTRY)
 
 
 def distribution(name: str) -> Distribution:
@@ -53,7 +74,32 @@ def distribution(name: str) -> Distribution:
     >>> distribution("Trowbridge_Reitz").name
     'ggx'
     """
-    key = check_name("distribution", name).strip().lower().translate(str.maketrans("_/ ", "---"))
-    if key not in _BY_NAME:
-        raise unknown_name("distribution", name, list(_BY_NAME))
-    return _BY_NAME[key]
+    return _REGISTRY[name]
+
+
+def one_parameter_distributions() -> list[Distribution]:
+    """Return every distribution that differs from the others for one parameter."""
+    return [mdf for mdf in _REGISTRY if _with_one_parameter(mdf) is mdf]
+
+
+def one_parameter_distribution(name: str) -> Distribution:
+    """Return the distribution with a given name or alias, as for `distribution`.
+
+    Raises
+    ------
+    MdfconvError
+        If the name is not known, or only makes a difference for pairs of parameters.
+    """
+    mdf = distribution(name)
+    other = _with_one_parameter(mdf)
+    if other is not mdf:
+        raise MdfconvError(f"with one parameter {mdf.name} is {other.name}", "name that")
+    return mdf
+
+
+def _with_one_parameter(mdf: Distribution) -> Distribution:
+    """Return what a distribution is for one parameter: itself, unless pairs are its point."""
+    equal = mdf.equivalent
+    if equal and equal.same_lobe and equal.same_parameter and not mdf.second_parameter:
+        return distribution(equal.name)
+    return mdf

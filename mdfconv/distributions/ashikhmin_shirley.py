@@ -6,6 +6,7 @@ import numpy as np
 
 from mdfconv.distributions.base import AnisotropicDistribution
 from mdfconv.distributions.blinn_phong import BlinnPhong
+from mdfconv.distributions.declarations import Equivalent
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import Parameter
 
@@ -26,7 +27,8 @@ class AshikhminShirley(BlinnPhong, AnisotropicDistribution):
     unit_formula = "cos^p β, p = N_x cos²φ + N_y sin²φ"
     normalized_formula = "√((N_x+2)(N_y+2))/(2π) cos^p β"
     source = "Ashikhmin & Shirley 2000; Pharr, Jakob & Humphreys 2016"
-    parameter = Parameter("exponents", "N", usual="N_x, N_y ≥ 1")
+    parameters = (Parameter("exponents", "N", (1.0, 1e4), larger_is_smoother=True),)
+    equivalent = Equivalent("blinn-phong")
 
     def _lobe_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
         self._lobe(beta, x * np.square(np.cos(phi)) + y * np.square(np.sin(phi)), out)

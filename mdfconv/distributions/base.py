@@ -2,27 +2,57 @@
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mdfconv.distributions.declarations import Equivalent, MapVariables, Printed
 from mdfconv.distributions.evaluation import Array, Kernel, as_operand, evaluate
-from mdfconv.distributions.parameter import Encoding, Parameter
+from mdfconv.distributions.parameter import Encoding, Parameter, number_text
 from mdfconv.errors import MdfconvError
 
 _SMALLEST_ANGLE = 1e-30
 
 
 class Distribution(ABC):
-    """A microfacet distribution function of one parameter.
+    """A microfacet distribution function of one parameter, or of two.
 
-    A subclass states its names, its parameter and its source, and gives two elementwise
-    kernels: `_lobe`, the distribution over its value at the normal, D(β)/D(0), and
-    `_at_normal`, D(0) of the normalized form, for which ∫ D cos β dω = 1 over the
-    hemisphere. Where the maximum is not at the normal it gives `_off_axis_maximum` too. The
-    widths have numerical defaults; a subclass that knows a closed form overrides them.
+    A subclass declares what is true of it (names, parameters, sources and what the class
+    attributes below say) and gives elementwise kernels: `_lobe`, the distribution over its value
+    at the normal, D(β)/D(0); `_at_normal`, D(0) of the normalized form, for which
+    ∫ D cos β dω = 1 over the hemisphere; the slopes of both, for fits; and `_cumulative`. Where
+    the maximum is not at the normal it gives `_off_axis_maximum` too. Widths and quantiles have
+    numerical defaults; a subclass that knows a closed form overrides them.
+
+    A second parameter γ is a field: kernels read `gamma`, and nothing else knows of it.
+
+    Parameters
+    ----------
+    gamma : float, optional
+        The second parameter of a distribution that has two; its default if not given.
+
+    Attributes
+    ----------
+    parameters : tuple of Parameter
+        The one that is converted, and γ if there are two.
+    operations : int
+        Arithmetic operations to evaluate the unit form from cos β, the parameter's constants
+        precomputed; a transcendental function counts as 10.
+    functions : tuple of str
+        The transcendental functions of NumPy that the kernel cannot avoid.
+    anisotropic : bool
+        Whether it takes a pair of parameters.
+    scales_with_slope : bool
+        Whether the cumulative distribution is a function of tan β over the parameter.
+    smith : bool
+        Whether Smith's Λ is known.
+    equivalent : Equivalent or None
+        The distribution that it is in another parameter.
+    map_variables : MapVariables or None
+        Those of the stored maps; None for a distribution without maps.
     """
 
     name: ClassVar[str]
@@ -30,13 +60,62 @@ class Distribution(ABC):
     unit_formula: ClassVar[str]
     normalized_formula: ClassVar[str]
     source: ClassVar[str]
-    parameter: ClassVar[Parameter]
-    encodings: ClassVar[tuple[Encoding, ...]] = ()
-    # Arithmetic operations to evaluate the unit form from cos β, the parameter's constants
-    # precomputed; a transcendental function counts as 10.
+    parameters: ClassVar[tuple[Parameter, ...]]
+    printed: ClassVar[Printed]
     operations: ClassVar[int]
+    functions: ClassVar[tuple[str, ...]] = ("tan",)
+    encodings: ClassVar[tuple[Encoding, ...]] = ()
+    map_variables: ClassVar[MapVariables | None] = None
+    anisotropic: ClassVar[bool] = False
+    scales_with_slope: ClassVar[bool] = False
+    smith: ClassVar[bool] = False
 
-    def unit(self, beta: ArrayLike, parameter: Any, *, phi: ArrayLike | None = None) -> Any:
+    def __init__(self, gamma: float | None = None) -> None:
+        self.gamma: Any = None
+        if self.second_parameter:
+            value = self.second_parameter.default if gamma is None else gamma
+            self.gamma = self.second_parameter.check_one(value, self.name)
+        elif gamma is not None:
+            raise MdfconvError(f"{self.name} has one parameter and no γ")
+
+    @property
+    def parameter(self) -> Parameter:
+        """The parameter that is converted."""
+        return self.parameters[0]
+
+    @property
+    def second_parameter(self) -> Parameter | None:
+        """γ, of a distribution of two parameters."""
+        return self.parameters[1] if len(self.parameters) > 1 else None
+
+    @property
+    def equivalent(self) -> Equivalent | None:
+        """The distribution that this one is in another parameter."""
+        return None
+
+    @property
+    def label(self) -> str:
+        """The name, with γ where there is one."""
+        if self.second_parameter is None:
+            return self.name
+        return f"{self.name} ({self.second_parameter.symbol} = {number_text(self.gamma)})"
+
+    def with_gamma(self, gamma: float) -> Self:
+        """Return the distribution with another γ; raise `MdfconvError` if it is illegal."""
+        return type(self)(gamma)
+
+    def is_same(self, other: Distribution) -> bool:
+        """Return whether two distributions take the same parameter for the same lobe."""
+        return self.name == other.name and self.gamma == other.gamma
+
+    def unit(
+        self,
+        beta: ArrayLike,
+        parameter: Any,
+        *,
+        phi: ArrayLike | None = None,
+        gamma: ArrayLike | None = None,
+    ) -> Any:
         """Evaluate the unit form D̄ = D / max D.
 
         Parameters
@@ -49,6 +128,8 @@ class Distribution(ABC):
             distribution anisotropic.
         phi : array_like, optional
             Azimuth of the half vector from the x axis, radians; only with a pair.
+        gamma : array_like, optional
+            The second parameter, of a distribution that has one; by default `self.gamma`.
 
         Returns
         -------
@@ -58,16 +139,90 @@ class Distribution(ABC):
         Raises
         ------
         MdfconvError
-            If a parameter is outside its legal range, or a pair or an azimuth does not apply.
+            If a parameter is outside its legal range, or a pair, an azimuth or a γ does not
+            apply.
         """
-        return self._evaluate(beta, parameter, phi, normalized=False)
+        return self._evaluate("_unit", beta, parameter, phi, gamma)
 
-    def normalized(self, beta: ArrayLike, parameter: Any, *, phi: ArrayLike | None = None) -> Any:
+    def normalized(
+        self,
+        beta: ArrayLike,
+        parameter: Any,
+        *,
+        phi: ArrayLike | None = None,
+        gamma: ArrayLike | None = None,
+    ) -> Any:
         """Evaluate the normalized form D, for which ∫ D cos β dω = 1.
 
         Parameters, shapes and errors are those of `unit`; the result is in 1/sr.
         """
-        return self._evaluate(beta, parameter, phi, normalized=True)
+        return self._evaluate("_normalized", beta, parameter, phi, gamma)
+
+    def cumulative(
+        self,
+        beta: ArrayLike,
+        parameter: ArrayLike,
+        *,
+        gamma: ArrayLike | None = None,
+        complement: bool = False,
+    ) -> Any:
+        """Evaluate F(β) = ∫ D cos β dω over the half vectors within β of the normal.
+
+        Parameters
+        ----------
+        beta, parameter, gamma
+            As for `unit`; one parameter, not a pair. Beyond π/2 F is 1.
+        complement : bool
+            Return 1 − F, with all its digits in the tail.
+
+        Returns
+        -------
+        numpy.ndarray or numpy scalar
+            F, the share of the projected area of the facets, in [0, 1].
+
+        Raises
+        ------
+        MdfconvError
+            As `unit`.
+        """
+        angle = np.minimum(np.abs(as_operand(beta)), np.pi / 2)
+        kernel = "_cumulative_tail" if complement else "_cumulative_lobe"
+        return self._evaluate(kernel, angle, parameter, None, gamma)
+
+    def sample(self, share: ArrayLike, parameter: ArrayLike, *, complement: bool = False) -> Any:
+        """Return the angle β at which F(β) is given: a half vector for a random number.
+
+        Parameters
+        ----------
+        share : array_like
+            F, from 0 to 1; with `complement` 1 − F.
+        parameter : array_like
+            The parameter, in its legal range; not a pair.
+        complement : bool
+            Whether the shares are those of the tail, 1 − F, which resolves grazing angles.
+
+        Returns
+        -------
+        numpy.ndarray or numpy scalar
+            β in radians, [0, π/2], float64, in the broadcast shape.
+
+        Raises
+        ------
+        MdfconvError
+            If a share is not from 0 to 1 or a parameter illegal.
+        """
+        shares = np.asarray(as_operand(share), dtype=float)
+        if not ((shares >= 0) & (shares <= 1)).all():
+            raise MdfconvError("a share of the facets is from 0 to 1")
+        legal = np.asarray(self.parameter.check(parameter, self.name), dtype=float)
+        shares, legal = np.broadcast_arrays(shares, legal)
+        lobe, tail = (1 - shares, shares) if complement else (shares, 1 - shares)
+        lobe, tail, legal = (np.atleast_1d(array) for array in (lobe, tail, legal))
+        with np.errstate(all="ignore"):
+            angle = np.where(lobe > 0, self._quantile(lobe, tail, legal), 0)
+            edge = self.edge(legal)
+        angle = np.where(tail > 0, angle, np.pi / 2 if edge is None else edge)
+        return np.clip(angle, 0, np.pi / 2).reshape(shares.shape)[()]
 
     def half_width(self, parameter: ArrayLike) -> Any:
         """Return β_half, the angle at which D falls to half of D(0) (Blinn 1977).
@@ -90,9 +245,7 @@ class Distribution(ABC):
 
     def from_half_tangent(self, tangent: ArrayLike) -> Any:
         """Return the parameter whose tan β_half is given; NaN where there is none."""
-        given = np.asarray(as_operand(tangent), dtype=float)
-        positive = np.where(given > 0, given, np.nan)
-        return self._legal(_elementwise(self._from_half_tangent, positive))
+        return self._legal(_elementwise(self._from_half_tangent, _positive(tangent)))
 
     def peak_alpha(self, parameter: ArrayLike) -> Any:
         """Return the α for which 1/(π α²) is D(0), the normalized form at β = 0.
@@ -104,9 +257,7 @@ class Distribution(ABC):
 
     def from_peak_alpha(self, alpha: ArrayLike) -> Any:
         """Return the parameter whose D(0) is 1/(π α²); NaN where there is none."""
-        given = np.asarray(as_operand(alpha), dtype=float)
-        positive = np.where(given > 0, given, np.nan)
-        return self._legal(_elementwise(self._from_peak_alpha, positive))
+        return self._legal(_elementwise(self._from_peak_alpha, _positive(alpha)))
 
     @abstractmethod
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
@@ -124,6 +275,10 @@ class Distribution(ABC):
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         """Kernel of ∂ ln D(0) / ∂ ln p of the normalized form."""
 
+    @abstractmethod
+    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        """Kernel of F(β) and 1 − F(β), each with its own digits."""
+
     def _off_axis_maximum(self, parameter: Array) -> Array | None:
         """Kernel of max D / D(0); None where that is 1 for every parameter given."""
         return None
@@ -131,6 +286,21 @@ class Distribution(ABC):
     def _log_slope_off_axis(self, parameter: Array) -> Array:
         """Kernel of ∂ ln(max D / D(0)) / ∂ ln p."""
         return np.zeros_like(parameter)
+
+    def smith_lambda(self, slope: Array) -> Array:
+        """Return Smith's Λ for α tan θ, the slope of a direction in units of the roughness.
+
+        Parameters
+        ----------
+        slope : numpy.ndarray
+            α tan θ ≥ 0; infinite at grazing.
+
+        Raises
+        ------
+        MdfconvError
+            If no closed form is known.
+        """
+        raise MdfconvError(f"{self.name} has no closed form of Smith's masking")
 
     def mode(self, parameter: Array) -> Array:
         """Return the angle at which D is largest, radians; 0 unless a subclass says otherwise."""
@@ -191,6 +361,22 @@ class Distribution(ABC):
         self._lobe(beta, parameter, out)
         out *= self._at_normal(parameter)
 
+    def _cumulative_lobe(self, beta: Array, parameter: Array, out: Array) -> None:
+        np.minimum(self._cumulative(beta, parameter)[0], 1, out=out)
+
+    def _cumulative_tail(self, beta: Array, parameter: Array, out: Array) -> None:
+        np.minimum(self._cumulative(beta, parameter)[1], 1, out=out)
+
+    def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
+        """Kernel of β for F = `lobe` and 1 − F = `tail`."""
+
+        def excess(log_beta: Array, lobe: Array, tail: Array, parameter: Array) -> Array:
+            below, above = self._cumulative(np.exp(log_beta), parameter)
+            return np.where(lobe < tail, below - lobe, tail - above)
+
+        bracket = (np.log(_SMALLEST_ANGLE), np.log(np.pi / 2))
+        return np.exp(find_root(excess, bracket, lobe, tail, parameter))
+
     def _half_tangent(self, parameter: Array) -> Array:
         def excess(log_beta: Array, parameter: Array) -> Array:
             return self._lobe(np.exp(log_beta), parameter) - 0.5
@@ -222,14 +408,31 @@ class Distribution(ABC):
         return np.where(self.parameter.accepts(parameter), parameter, np.nan)[()]
 
     def _evaluate(
-        self, beta: ArrayLike, parameter: Any, phi: ArrayLike | None, *, normalized: bool
+        self,
+        kernel: str,
+        beta: ArrayLike,
+        parameter: Any,
+        phi: ArrayLike | None,
+        gamma: ArrayLike | None,
     ) -> Any:
+        """Check the arguments and evaluate the kernel of a name in blocks."""
         if isinstance(parameter, tuple) or phi is not None:
             raise MdfconvError(
-                f"{self.name} is isotropic: it takes one parameter and no azimuth phi"
+                f"{self.name} is isotropic here: it takes one parameter and no azimuth phi"
             )
-        kernel = self._normalized if normalized else self._unit
-        return evaluate(kernel, beta, self.parameter.check(parameter, self.name))
+        legal = self.parameter.check(parameter, self.name)
+        if self.second_parameter is None:
+            if gamma is not None:
+                raise MdfconvError(f"{self.name} has one parameter and no γ")
+            return evaluate(getattr(self, kernel), beta, legal)
+        gammas = self.second_parameter.check(self.gamma if gamma is None else gamma, self.name)
+
+        def with_gamma(beta: Array, parameter: Array, gamma: Array, out: Array) -> None:
+            block = copy.copy(self)
+            block.gamma = gamma
+            getattr(block, kernel)(beta, parameter, out)
+
+        return evaluate(with_gamma, beta, legal, gammas)
 
 
 class AnisotropicDistribution(Distribution):
@@ -238,6 +441,8 @@ class AnisotropicDistribution(Distribution):
     In the section along an axis it follows the one-parameter distribution. The subclass
     gives the two kernels for pairs.
     """
+
+    anisotropic = True
 
     @abstractmethod
     def _lobe_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
@@ -259,36 +464,46 @@ class AnisotropicDistribution(Distribution):
         out *= self._at_normal_pair(x, y)
 
     def _evaluate(
-        self, beta: ArrayLike, parameter: Any, phi: ArrayLike | None, *, normalized: bool
+        self,
+        kernel: str,
+        beta: ArrayLike,
+        parameter: Any,
+        phi: ArrayLike | None,
+        gamma: ArrayLike | None,
     ) -> Any:
-        if not isinstance(parameter, tuple):
+        if not isinstance(parameter, tuple) or not hasattr(self, f"{kernel}_pair"):
             if phi is not None:
                 raise MdfconvError("an azimuth phi needs a pair of parameters")
-            return super()._evaluate(beta, parameter, phi, normalized=normalized)
+            return super()._evaluate(kernel, beta, parameter, phi, gamma)
         if len(parameter) != 2:
             raise MdfconvError(f"a pair of parameters has two members, not {len(parameter)}")
         if phi is None:
             raise MdfconvError("a pair of parameters needs an azimuth phi")
         x, y = (self.parameter.check(value, self.name) for value in parameter)
-        kernel = self._normalized_pair if normalized else self._unit_pair
-        return evaluate(kernel, beta, x, y, phi)
+        return evaluate(getattr(self, f"{kernel}_pair"), beta, x, y, phi)
 
 
 def _elementwise(function: Kernel, values: ArrayLike) -> Any:
     """Apply a float64 function that expects at least one dimension to values of any shape."""
     array = np.asarray(values, dtype=float)
-    # At the ends of a range a width is 0, infinite or not there: results, not accidents.
+    # At the ends of a range a width is 0, infinite or missing: results, not accidents.
     with np.errstate(all="ignore"):
         return array if array.size == 0 else function(np.atleast_1d(array)).reshape(array.shape)[()]
 
 
-def find_root(function: Kernel, bracket: tuple[float, float], argument: Array) -> Array:
+def _positive(values: ArrayLike) -> Array:
+    """Return real numbers as float64, NaN where they are not positive."""
+    array = np.asarray(as_operand(values), dtype=float)
+    return np.where(array > 0, array, np.nan)
+
+
+def find_root(function: Kernel, bracket: tuple[float, float], *arguments: Array) -> Array:
     """Return the elementwise root of a function inside a bracket, NaN where there is none."""
     from scipy.optimize import elementwise
 
-    lower, upper = (np.full(argument.shape, end) for end in bracket)
-    found = elementwise.find_root(function, (lower, upper), args=(argument,))
+    lower, upper = (np.full(arguments[0].shape, end) for end in bracket)
+    result = elementwise.find_root(function, (lower, upper), args=arguments)
     # A function that only approaches 0 towards an end has no root there.
-    crosses = function(lower, argument) * function(upper, argument) < 0
-    root: Array = np.where(found.success & crosses, found.x, np.nan)
+    crosses = function(lower, *arguments) * function(upper, *arguments) < 0
+    root: Array = np.where(result.success & crosses, result.x, np.nan)
     return root

@@ -2,13 +2,45 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from mdfconv.distributions.base import AnisotropicDistribution
-from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
+from mdfconv.distributions.declarations import (
+    MapVariables,
+    Printed,
+    inverse_square_over_pi,
+    same,
+)
+from mdfconv.distributions.evaluation import (
+    Array,
+    inverse_square,
+    negative_log_tail,
+    tangent_square,
+)
 from mdfconv.distributions.parameter import GLOSSINESS, ROUGHNESS, Parameter
 
 _NEWTON_STEPS = 12
+
+
+def _printed_unit(beta: Any, m: Any) -> Any:
+    value = np.exp(-(np.tan(beta) ** 2) / m**2) / np.cos(beta) ** 4
+    if np.all(2 * m**2 <= 1):
+        return value
+    return value / np.where(2 * m**2 > 1, 4 * m**4 * np.exp(1 / m**2 - 2), 1)
+
+
+def _printed_cosine(m: Any) -> Any:
+    # u² e^(−(u−1)/m²) = ½ for u = 1/cos²β_half.
+    from scipy.special import lambertw
+
+    argument = -np.exp(-1 / (2 * m**2)) / (2 * np.sqrt(2).astype(m.dtype) * m**2)
+    return 1 / np.sqrt(-2 * m**2 * lambertw(argument, -1).real)
+
+
+def _printed_from_cosine(c: Any) -> Any:
+    return np.tan(np.arccos(c)) / np.sqrt(float(np.log(2)) - 4 * np.log(c))
 
 
 class Beckmann(AnisotropicDistribution):
@@ -21,6 +53,7 @@ class Beckmann(AnisotropicDistribution):
     divided by 4m⁴ e^(1/m²−2) for m > 1/√2, where the maximum lies at t² = 2m² − 1 and no
     longer at β = 0. Normalized by 1/(π m²). Anisotropic: t²/m² becomes
     t² (cos²φ/m_x² + sin²φ/m_y²) and m² in the constant becomes m_x m_y.
+    F = 1 − e^(−t²/m²); Smith's Λ is that of Heitz 2014, eq. (66), exact.
 
     The form in t keeps every digit up to β = π/2 and needs one
     trigonometric function instead of two.
@@ -31,17 +64,34 @@ class Beckmann(AnisotropicDistribution):
     unit_formula = "exp(−tan²β/m²) / cos⁴β, divided by its maximum where m > 1/√2"
     normalized_formula = "exp(−tan²β/m²) / (π m² cos⁴β)"
     source = "Beckmann & Spizzichino 1963; Cook & Torrance 1981"
-    parameter = Parameter("alpha", "m_B", usual="0 < m_B ≤ 1")
+    parameters = (Parameter("alpha", "m_B", (0.01, 0.8)),)
     operations = 17
+    functions = ("tan", "exp")
+    scales_with_slope = True
+    smith = True
     encodings = (ROUGHNESS, GLOSSINESS)
+    map_variables = MapVariables(
+        width=same,
+        from_width=same,
+        concentration=lambda m: (1 - m) * (1 + m) / (m * m),
+        from_map=lambda x, product: x / np.sqrt(x * x + product),
+    )
+    printed = Printed(
+        _printed_unit,
+        inverse_square_over_pi,
+        cosine=_printed_cosine,
+        from_cosine=_printed_from_cosine,
+        peak_alpha=same,
+        from_peak_alpha=same,
+    )
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         square = tangent_square(beta, out)
-        return _lobe(square, square * -inverse_square(parameter))
+        return _times_secant_power(square, square * -inverse_square(parameter))
 
     def _lobe_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
         square = tangent_square(beta, out)
-        _lobe(square, square * -slope_scale(x, y, phi))
+        _times_secant_power(square, square * -slope_scale(x, y, phi))
 
     def _at_normal(self, parameter: Array) -> Array:
         return 1 / (np.pi * parameter * parameter)
@@ -52,7 +102,7 @@ class Beckmann(AnisotropicDistribution):
     def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         square = tangent_square(beta)
         exponent = square * inverse_square(parameter)
-        return _lobe(square, -exponent), 2 * exponent
+        return _times_secant_power(square, -exponent), 2 * exponent
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return np.full_like(parameter, -2)
@@ -63,6 +113,24 @@ class Beckmann(AnisotropicDistribution):
 
     def _log_slope_off_axis(self, parameter: Array) -> Array:
         return 4 - 2 / np.maximum(np.square(parameter), 0.5)
+
+    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        exponent = tangent_square(beta) * inverse_square(parameter)
+        return -np.expm1(-exponent), np.exp(-exponent)
+
+    def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
+        # Walter et al. 2007, eq. (28).
+        return np.arctan(parameter * np.sqrt(negative_log_tail(lobe, tail)))
+
+    def smith_lambda(self, slope: Array) -> Array:
+        """Return Λ = ½ (erf(a) − 1) + e^(−a²)/(2a√π), a = 1/slope (Heitz 2014, eq. 66)."""
+        from scipy.special import erfcx
+
+        with np.errstate(all="ignore"):
+            a = 1 / slope
+            # erf − 1 = −erfc, and both terms have the factor e^(−a²).
+            value = 0.5 * np.exp(-a * a) * (slope / np.sqrt(np.pi) - erfcx(a))
+        return np.where(slope == 0, 0, np.maximum(value, 0))
 
     def _off_axis_maximum(self, parameter: Array) -> Array | None:
         square = np.square(parameter)
@@ -99,7 +167,7 @@ def slope_scale(x: Array, y: Array, phi: Array) -> Array:
     return along_x + np.square(np.sin(phi)) * inverse_square(y)
 
 
-def _lobe(square: Array, exponent: Array) -> Array:
+def _times_secant_power(square: Array, exponent: Array) -> Array:
     """Turn t² into (1+t²)² e^exponent in place."""
     np.exp(exponent, out=exponent)
     square += 1

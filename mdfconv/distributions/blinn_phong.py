@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.evaluation import Array, tangent_square
+from mdfconv.distributions.declarations import MapVariables, Printed, same
+from mdfconv.distributions.evaluation import Array, negative_log_tail, tangent_square
 from mdfconv.distributions.parameter import Parameter
 
 
@@ -16,8 +17,8 @@ class BlinnPhong(Distribution):
 
         D̄ = cos^N β = exp(−½ N ln(1 + tan²β)).
 
-    Normalized by (N+2)/(2π). The tangent keeps the digits both near β = 0, where
-    ln cos β = ln(1 − …) loses them, and near π/2, where ln(1 − sin²β) does.
+    Normalized by (N+2)/(2π); F = 1 − cos^(N+2) β. The tangent keeps the digits both near β = 0,
+    where ln cos β = ln(1 − …) loses them, and near π/2, where ln(1 − sin²β) does.
     """
 
     name = "blinn-phong"
@@ -25,8 +26,23 @@ class BlinnPhong(Distribution):
     unit_formula = "cos^N β"
     normalized_formula = "(N+2)/(2π) cos^N β"
     source = "Phong 1975; Blinn 1977; Lewis 1994"
-    parameter = Parameter("exponent", "N", usual="N ≥ 1")
+    parameters = (Parameter("exponent", "N", (1.0, 1e4), larger_is_smoother=True),)
     operations = 20
+    functions = ("tan", "log1p", "exp")
+    map_variables = MapVariables(
+        width=lambda n: np.sqrt(2 / (n + 2)),
+        from_width=lambda x: 2 * (1 - x) * (1 + x) / (x * x),
+        concentration=same,
+        from_map=lambda x, product: product / (x * x),
+    )
+    printed = Printed(
+        lambda beta, n: np.cos(beta) ** n,
+        lambda n: (n + 2) / (2 * np.pi),
+        cosine=lambda n: 2 ** (-1 / n),
+        from_cosine=lambda c: -float(np.log(2)) / np.log(c),
+        peak_alpha=lambda n: np.sqrt(2 / (n + 2)),
+        from_peak_alpha=lambda alpha: 2 / alpha**2 - 2,
+    )
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         value = tangent_square(beta, out)
@@ -44,6 +60,14 @@ class BlinnPhong(Distribution):
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return parameter / (parameter + 2)
+
+    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        exponent = -0.5 * (parameter + 2) * np.log1p(tangent_square(beta))
+        return -np.expm1(exponent), np.exp(exponent)
+
+    def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
+        exponent = 2 * negative_log_tail(lobe, tail) / (parameter + 2)
+        return np.arctan(np.sqrt(np.expm1(exponent)))
 
     def _half_tangent(self, parameter: Array) -> Array:
         return np.sqrt(np.expm1(2 * np.log(2) / parameter))

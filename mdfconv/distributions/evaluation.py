@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -134,3 +135,17 @@ def tangent_square(beta: Array, out: Array | None = None) -> Array:
     """Return tan²β, the variable in which the kernels keep their digits up to π/2."""
     tangent: Array = np.tan(beta, out=out)
     return np.square(tangent, out=tangent)
+
+
+def negative_log_tail(lobe: Array, tail: Array) -> Array:
+    """Return −ln(1 − F) for F and 1 − F, from the one that has the digits."""
+    logarithm: Array = np.where(lobe < tail, -np.log1p(-lobe), -np.log(tail))
+    return logarithm
+
+
+@cache
+def gauss_legendre(order: int) -> tuple[Array, Array]:
+    """Return nodes and weights on [−1, 1]; they must not be written to."""
+    nodes, weights = np.polynomial.legendre.leggauss(order)
+    nodes.flags.writeable = weights.flags.writeable = False
+    return nodes, weights

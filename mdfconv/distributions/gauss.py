@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.evaluation import Array, inverse_square
+from mdfconv.distributions.declarations import MapVariables, Printed, same
+from mdfconv.distributions.evaluation import Array, gauss_legendre, inverse_square
 from mdfconv.distributions.parameter import Parameter
 
 _NODES = 80
+# π/2 is this beyond its double.
+_HALF_PI_REST = 6.123233995736766e-17
+# Nodes for e^(−v) times a smooth function up to v = 50, from where on it is nothing.
+_LONGEST, _CUMULATIVE_NODES = 50.0, 64
+
+
+def _printed_constant(m: Any) -> Any:
+    log_cosine = np.log(np.cos(m * np.sqrt(np.log(2)).astype(m.dtype)))
+    return (2 * log_cosine - float(np.log(2))) / (2 * np.pi * log_cosine)
 
 
 class Gauss(Distribution):
@@ -23,6 +35,9 @@ class Gauss(Distribution):
 
         Z = ½ √π m Im[ w(m) + e^(−π²/4m²) w(m + iπ/2m) ].
 
+    The same substitution gives the cumulative distribution, but as a difference; here F and 1 − F
+    are integrals of e^(−u/m²) sin(2√u)/(2√u) over u = β², which have positive terms only.
+
     Sawicki 2021 (Table 1) uses another constant, borrowed from Blinn/Phong at equal half
     angle; see `sawicki_constant`.
     """
@@ -32,8 +47,22 @@ class Gauss(Distribution):
     unit_formula = "exp(−β²/m²)"
     normalized_formula = "exp(−β²/m²) / (π ∫ exp(−β²/m²) sin 2β dβ)"
     source = "Torrance & Sparrow 1967"
-    parameter = Parameter("width", "m_G", usual="0 < m_G ≤ 1")
+    parameters = (Parameter("width", "m_G", (0.01, 0.8)),)
     operations = 23
+    functions = ("exp",)
+    map_variables = MapVariables(
+        width=same,
+        from_width=same,
+        concentration=lambda m: 1 / (m * m),
+        from_map=lambda x, product: x / np.sqrt(product),
+    )
+    printed = Printed(
+        lambda beta, m: np.exp(-(beta**2) / m**2),
+        _printed_constant,
+        cosine=lambda m: np.cos(m * np.sqrt(np.log(2)).astype(m.dtype)),
+        from_cosine=lambda c: np.arccos(c) / np.sqrt(np.log(2)).astype(c.dtype),
+        peak_alpha=lambda m: 1 / np.sqrt(np.pi * _printed_constant(m)),
+    )
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         value = np.square(beta, out=out)
@@ -53,6 +82,15 @@ class Gauss(Distribution):
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         # −∂ ln Z/∂ ln m as a mean: differences of Faddeeva functions cancel for large m.
         return -2 * _mean_square(parameter) / np.square(parameter)
+
+    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        # The whole integral is the longer of the two parts plus the other.
+        angle, m = np.broadcast_arrays(beta, parameter)
+        to_horizon = (0.5 * np.pi - angle) + _HALF_PI_REST
+        below = _slab_integral(np.zeros_like(angle), angle, 0.5 * np.pi + 0 * angle, m)
+        above = _slab_integral(angle, to_horizon, to_horizon, m)
+        whole = below + above
+        return below / whole, above / whole
 
     def _half_tangent(self, parameter: Array) -> Array:
         beta_half = parameter * np.sqrt(np.log(2))
@@ -97,9 +135,33 @@ def _sine_integral(parameter: Array) -> Array:
     return integral
 
 
+def _slab_integral(start: Array, length: Array, to_horizon: Array, m: Array) -> Array:
+    """Return ∫ e^(−b²/m²) sin 2b db from an angle on, over a length.
+
+    Parameters
+    ----------
+    start, length : numpy.ndarray
+        Where the integral begins and how far it reaches, radians.
+    to_horizon : numpy.ndarray
+        π/2 − start, which near the horizon keeps the digits of sin 2b.
+    m : numpy.ndarray
+        The width, of the same shape.
+    """
+    x, weight = gauss_legendre(_CUMULATIVE_NODES)
+    # Over u = b²: b² − start² = (b − start)(b + start).
+    span = np.minimum(length * (2 * start + length), _LONGEST * np.square(m))[..., None]
+    step = 0.5 * span * (1 + x)
+    # An angle whose square underflows is as good as this one.
+    b = np.sqrt(np.maximum(np.square(start)[..., None] + step, 1e-300))
+    advance = step / (b + start[..., None])
+    to_zero = np.minimum(b, to_horizon[..., None] - advance)
+    mass = np.exp(-step / np.square(m)[..., None]) * np.sin(2 * to_zero) / (2 * b)
+    return np.exp(-np.square(start / m)) * np.sum(span * weight * mass, axis=-1)
+
+
 def _mean_square(parameter: Array) -> Array:
     """Return the mean of β² under the weight e^(−β²/m²) sin 2β on [0, π/2]."""
-    x, weight = np.polynomial.legendre.leggauss(_NODES)
+    x, weight = gauss_legendre(_NODES)
     # Beyond 12 m, or π/2, the weight is nothing.
     reach = np.minimum(12 * parameter[..., None], 0.5 * np.pi)
     beta = 0.5 * reach * (1 + x)

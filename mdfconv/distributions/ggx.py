@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from mdfconv.distributions.base import AnisotropicDistribution
 from mdfconv.distributions.beckmann import slope_scale
+from mdfconv.distributions.declarations import (
+    MapVariables,
+    Printed,
+    inverse_square_over_pi,
+    same,
+)
 from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
 from mdfconv.distributions.parameter import GLOSSINESS, ROUGHNESS, Parameter
 
 _EXCESS = np.sqrt(2) - 1
+
+
+def printed_cosine(alpha: Any, gamma: Any) -> Any:
+    """Return cos β_half of [α² / (cos²β (α²−1) + 1)]^γ, as printed for γ = 2."""
+    return np.sqrt((2 ** (1 / gamma) * alpha**2 - 1) / (alpha**2 - 1))
+
+
+def printed_from_cosine(c: Any, gamma: Any) -> Any:
+    """Return α for cos β_half, as printed for γ = 2."""
+    return np.sqrt((c**2 - 1) / (c**2 - 2 ** (1 / gamma)))
 
 
 class GGX(AnisotropicDistribution):
@@ -21,7 +39,8 @@ class GGX(AnisotropicDistribution):
 
     Normalized by 1/(π α²). Anisotropic: t²/α² becomes t² (cos²φ/α_x² + sin²φ/α_y²) and α²
     in the constant becomes α_x α_y (Burley 2012). The printed cos²β (α²−1) + 1 loses every
-    digit for smooth surfaces; the tangent form has only positive terms.
+    digit for smooth surfaces; the tangent form has only positive terms. F = t²/(t²+α²); Smith's
+    Λ = ½ (√(1 + α² tan²θ) − 1).
     """
 
     name = "ggx"
@@ -29,9 +48,25 @@ class GGX(AnisotropicDistribution):
     unit_formula = "[α² / (α² + (1−α²) sin²β)]²"
     normalized_formula = "[α² / (α² + (1−α²) sin²β)]² / (π α²)"
     source = "Trowbridge & Reitz 1975; Walter et al. 2007; Burley 2012"
-    parameter = Parameter("alpha", "α", upper=1.0, upper_closed=True, usual="0 < α ≤ 1")
+    parameters = (Parameter("alpha", "α", (0.01, 0.8), upper=1.0, upper_closed=True),)
     operations = 5
+    scales_with_slope = True
+    smith = True
     encodings = (ROUGHNESS, GLOSSINESS)
+    map_variables = MapVariables(
+        width=same,
+        from_width=same,
+        concentration=lambda alpha: (1 - alpha) * (1 + alpha) / (alpha * alpha),
+        from_map=lambda x, product: np.minimum(x / np.sqrt(x * x + product), 1),
+    )
+    printed = Printed(
+        lambda beta, alpha: (alpha**2 / (np.cos(beta) ** 2 * (alpha**2 - 1) + 1)) ** 2,
+        inverse_square_over_pi,
+        cosine=lambda alpha: printed_cosine(alpha, np.full_like(alpha, 2)),
+        from_cosine=lambda c: printed_from_cosine(c, np.full_like(c, 2)),
+        peak_alpha=same,
+        from_peak_alpha=same,
+    )
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         return trowbridge_reitz(beta, inverse_square(parameter), out)
@@ -57,6 +92,21 @@ class GGX(AnisotropicDistribution):
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return np.full_like(parameter, -2)
+
+    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        ratio = tangent_square(beta) * inverse_square(parameter)
+        return ratio / (1 + ratio), 1 / (1 + ratio)
+
+    def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
+        # Walter et al. 2007, eq. (35).
+        return np.arctan(parameter * np.sqrt(lobe / tail))
+
+    def smith_lambda(self, slope: Array) -> Array:
+        """Return Λ = ½ (√(1 + slope²) − 1) (Walter et al. 2007, eq. 34; Heitz 2014, eq. 72)."""
+        with np.errstate(invalid="ignore"):
+            # Without the difference, and without slope² where it would overflow.
+            value = 0.5 * slope * (slope / (1 + np.hypot(1, slope)))
+        return np.where(np.isinf(slope), np.inf, value)
 
     def _half_tangent(self, parameter: Array) -> Array:
         # t² = e α² / (1 − (1+e) α²), e = √2 − 1: Sawicki 2021, eq. (8), free of its 1 − cos².

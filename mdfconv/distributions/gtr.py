@@ -5,13 +5,21 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.evaluation import Array, evaluate, inverse_square, tangent_square
-from mdfconv.distributions.ggx import trowbridge_reitz
+from mdfconv.distributions.declarations import Equivalent, Printed
+from mdfconv.distributions.evaluation import (
+    Array,
+    inverse_square,
+    tangent_square,
+)
+from mdfconv.distributions.ggx import printed_cosine, printed_from_cosine, trowbridge_reitz
 from mdfconv.distributions.parameter import Parameter
-from mdfconv.errors import MdfconvError
+
+
+def _printed_constant(alpha: Any, gamma: Any) -> Any:
+    k = (gamma - 1) * (alpha**2 - 1) / (np.pi * (1 - alpha ** (2 * (1 - gamma))))
+    return k / alpha ** (2 * gamma)
 
 
 class GTR(Distribution):
@@ -25,12 +33,9 @@ class GTR(Distribution):
 
         k = (γ−1) (α²−1) / (π (1 − α^(2(1−γ)))),   (α²−1) / (π ln α²) at γ = 1.
 
-    The constant 1/π · α² printed in Sawicki 2021 (Table 1) is right at γ = 2 only.
-
-    Parameters
-    ----------
-    gamma : float
-        The exponent γ > 0 that applies where a call gives none.
+    The constant 1/π · α² printed in Sawicki 2021 (Table 1) is right at γ = 2 only. With
+    X = (1−α²)/α² the cumulative distribution is
+    F = [1 − (1+x)^(1−γ)] / [1 − (1+X)^(1−γ)], ln(1+x)/ln(1+X) at γ = 1.
     """
 
     name = "gtr"
@@ -38,75 +43,45 @@ class GTR(Distribution):
     unit_formula = "[α² / (α² + (1−α²) sin²β)]^γ"
     normalized_formula = "k / (1 + (α²−1) cos²β)^γ, k = (γ−1)(α²−1) / (π (1 − α^(2(1−γ))))"
     source = "Burley 2012"
-    parameter = Parameter("alpha", "C_TR", upper=1.0, upper_closed=True, usual="0 < C_TR ≤ 1")
+    parameters = (
+        Parameter("alpha", "C_TR", (0.01, 0.8), upper=1.0, upper_closed=True),
+        # Towards γ → ∞ it becomes a Gaussian in sin β: α and γ can no longer be told apart.
+        Parameter("gamma", "γ", (1.5, 3.0), default=2.0, fit_range=(0.25, 64.0)),
+    )
     operations = 24
-    exponent = Parameter("gamma", "γ", usual="1.5 ≤ γ ≤ 3")
+    printed = Printed(
+        lambda beta, alpha, gamma: (alpha**2 / (np.cos(beta) ** 2 * (alpha**2 - 1) + 1)) ** gamma,
+        _printed_constant,
+        cosine=printed_cosine,
+        from_cosine=printed_from_cosine,
+        peak_alpha=lambda alpha, gamma: 1 / np.sqrt(np.pi * _printed_constant(alpha, gamma)),
+    )
 
-    def __init__(self, gamma: float = 2.0) -> None:
-        self.gamma = self.exponent.check_one(gamma, self.name)
-
-    def unit(
-        self,
-        beta: ArrayLike,
-        parameter: Any,
-        *,
-        phi: ArrayLike | None = None,
-        gamma: ArrayLike | None = None,
-    ) -> Any:
-        """Evaluate the unit form; as `Distribution.unit`, with the exponent γ > 0."""
-        return self._evaluate_gamma(self._lobe_gamma, beta, parameter, phi, gamma)
-
-    def normalized(
-        self,
-        beta: ArrayLike,
-        parameter: Any,
-        *,
-        phi: ArrayLike | None = None,
-        gamma: ArrayLike | None = None,
-    ) -> Any:
-        """Evaluate the normalized form, 1/sr; as `Distribution.normalized`, with γ > 0."""
-        return self._evaluate_gamma(self._normalized_gamma, beta, parameter, phi, gamma)
-
-    def _evaluate_gamma(
-        self, kernel: Any, beta: ArrayLike, parameter: Any, phi: Any, gamma: ArrayLike | None
-    ) -> Any:
-        if phi is not None or isinstance(parameter, tuple):
-            raise MdfconvError("gtr is isotropic: it takes one parameter and no azimuth")
-        alpha = self.parameter.check(parameter, self.name)
-        exponent = self.exponent.check(self.gamma if gamma is None else gamma, self.name)
-        return evaluate(kernel, beta, alpha, exponent)
+    @property
+    def equivalent(self) -> Equivalent | None:
+        """GGX at γ = 2."""
+        same = "gtr with γ = 2 is ggx"
+        is_ggx = self.gamma == 2
+        return Equivalent("ggx", forward_text=same, backward_text=same) if is_ggx else None
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
-        return self._lobe_gamma(beta, parameter, np.asarray(self.gamma), out)
-
-    def _at_normal(self, parameter: Array) -> Array:
-        return self._at_normal_gamma(parameter, self.gamma)
-
-    def _lobe_gamma(
-        self, beta: Array, alpha: Array, gamma: Array, out: Array | None = None
-    ) -> Array:
-        scale = inverse_square(alpha)
-        if gamma.size == 1 and gamma == 2:
+        scale = inverse_square(parameter)
+        if np.size(self.gamma) == 1 and self.gamma == 2:
             return trowbridge_reitz(beta, scale, out)
+        # exp(−γ ln(1 + x)), x = sin²β (1−α²)/α²
         value = tangent_square(beta, out)
         value /= 1 + value
-        value *= scale * ((1 - alpha) * (1 + alpha))
+        value *= scale * ((1 - parameter) * (1 + parameter))
         np.log1p(value, out=value)
-        value *= -gamma
+        value *= -self.gamma
         return np.exp(value, out=value)
 
-    def _normalized_gamma(self, beta: Array, alpha: Array, gamma: Array, out: Array) -> None:
-        self._lobe_gamma(beta, alpha, gamma, out)
-        out *= self._at_normal_gamma(alpha, gamma)
-
-    def _at_normal_gamma(self, alpha: Array, gamma: Array | float) -> Array:
-        # k α^(−2γ) = (1−α²)/(L α²π) · y/(1−e^(−y)) with L = −ln α², y = (γ−1) L: each factor
-        # tends to 1 (times 1/α²π) as α → 1 or γ → 1.
-        log_square = -2 * np.log(alpha)
-        first = _ratio((1 - alpha) * (1 + alpha), log_square)
-        exponent = (gamma - 1) * log_square
-        second = _ratio(exponent, -np.expm1(-exponent))
-        return first * second * (1 / (np.pi * alpha * alpha))
+    def _at_normal(self, parameter: Array) -> Array:
+        # k α^(−2γ) = (1−α²)/(L α²π) · 1/φ(y L) with L = −ln α², y = γ−1: each factor tends to 1
+        # (times 1/α²π) as α → 1 or γ → 1.
+        log_square = -2 * np.log(parameter)
+        first = _ratio((1 - parameter) * (1 + parameter), log_square)
+        return first / _phi((self.gamma - 1) * log_square) / (np.pi * parameter * parameter)
 
     def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         ratio = np.square(np.sin(beta)) * inverse_square(parameter)
@@ -121,13 +96,59 @@ class GTR(Distribution):
         y = (self.gamma - 1) * log_square
         return first - 2 * (self.gamma - 1) * _bernoulli(y) - 2
 
+    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        # With z = ln(1+x), Z = ln(1+X), y = γ−1 and φ(u) = (1 − e^(−u))/u:
+        # F = z φ(yz) / (Z φ(yZ)), 1 − F = e^(−yz) (Z−z) φ(y (Z−z)) / (Z φ(yZ)).
+        square = tangent_square(beta)
+        cosine_square = 1 / (1 + square)
+        largest = ((1 - parameter) * (1 + parameter)) * inverse_square(parameter)
+        x = square * cosine_square * largest
+        z, whole = np.log1p(x), np.log1p(largest)
+        rest = np.log1p(largest * cosine_square / (1 + x))
+        y = self.gamma - 1
+        scale = _phi(y * whole)
+        # At α = 1 the lobe is uniform: the shares are sin²β and cos²β.
+        uniform = largest == 0
+        safe = np.where(uniform, 1, whole)
+        lobe = np.where(uniform, square * cosine_square, z / safe) * _phi(y * z) / scale
+        tail = np.where(uniform, cosine_square, rest / safe) * _phi(y * rest) / scale
+        return lobe, tail * np.exp(-y * z)
+
+    def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
+        # (1+x)^(−y) = 1 − F (1 − (1+X)^(−y)); ln(1+x) = F ln(1+X) at γ = 1.
+        largest = ((1 - parameter) * (1 + parameter)) * inverse_square(parameter)
+        whole, y = np.log1p(largest), self.gamma - 1
+        span = -np.expm1(-y * whole)
+        if y == 0:
+            z, rest = lobe * whole, tail * whole
+        else:
+            # From the horizon inwards: (1+x)^(−y) = (1+X)^(−y) + (1 − F) (1 − (1+X)^(−y)).
+            near = np.log1p(-lobe * span)
+            z = -np.where(lobe < tail, near, np.log(np.exp(-y * whole) + tail * span)) / y
+            rest = np.log1p(tail * np.expm1(y * whole)) / y
+        uniform = largest == 0
+        scale = np.where(uniform, 1, largest)
+        sine_square = np.where(uniform, lobe, np.expm1(z) / scale)
+        cosine_square = np.where(uniform, tail, np.expm1(rest) * np.exp(z) / scale)
+        # The larger of the two is what the smaller one leaves.
+        low = sine_square < 0.5
+        cosine_square = np.where(low, 1 - sine_square, cosine_square)
+        sine_square = np.where(low, sine_square, 1 - cosine_square)
+        return np.arctan2(np.sqrt(sine_square), np.sqrt(cosine_square))
+
     def _half_tangent(self, parameter: Array) -> Array:
+        # t² = e α² / (1 − (1+e) α²), e = 2^(1/γ) − 1
         excess = np.expm1(np.log(2) / self.gamma)
         return parameter * np.sqrt(excess / (1 - (1 + excess) * np.square(parameter)))
 
     def _from_half_tangent(self, tangent: Array) -> Array:
         excess = np.expm1(np.log(2) / self.gamma)
         return tangent / np.sqrt(excess + (1 + excess) * np.square(tangent))
+
+
+def _phi(u: Array) -> Array:
+    """Return (1 − e^(−u))/u, 1 at 0."""
+    return _ratio(-np.expm1(-u), np.asarray(u))
 
 
 def _bernoulli(y: Array) -> Array:

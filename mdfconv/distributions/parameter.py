@@ -20,7 +20,7 @@ def number_text(value: float) -> str:
 
 @dataclass(frozen=True)
 class Parameter:
-    """One scalar parameter of a distribution: its name, symbol and range.
+    """One scalar parameter: its name, symbol and ranges.
 
     Parameters
     ----------
@@ -28,19 +28,28 @@ class Parameter:
         The field's name for it, such as ``"roughness"`` or ``"exponent"``.
     symbol : str
         The symbol in the source, such as ``"m_B"``.
+    typical : tuple of two floats
+        The range in which scenes use it, on which every distribution has an answer.
     lower, upper : float
         The legal range. It is closed where `lower_closed` and `upper_closed` say so.
-    usual : str
-        The range in which scenes use it, in words for the reader.
+    larger_is_smoother : bool
+        Whether a larger value is a smoother surface, as of an exponent or a glossiness.
+    default : float
+        The value where none is given: of a second parameter.
+    fit_range : tuple of two floats
+        The range in which a fit looks for it where it is free: of a second parameter.
     """
 
     name: str
     symbol: str
+    typical: tuple[float, float]
     lower: float = 0.0
     upper: float = float("inf")
     lower_closed: bool = False
     upper_closed: bool = False
-    usual: str = ""
+    larger_is_smoother: bool = False
+    default: float = float("nan")
+    fit_range: tuple[float, float] = (float("nan"), float("nan"))
 
     @property
     def legal(self) -> str:
@@ -51,6 +60,11 @@ class Parameter:
         if self.upper == float("inf"):
             return f"{self.symbol} {'≥' if self.lower_closed else '>'} {lower}"
         return f"{lower} {above} {self.symbol} {below} {upper}"
+
+    @property
+    def typical_value(self) -> float:
+        """The geometric mean of the typical range."""
+        return float(np.sqrt(self.typical[0] * self.typical[1]))
 
     def accepts(self, values: Array) -> Any:
         """Return where values are finite and inside the legal range (bool, same shape)."""
@@ -105,7 +119,7 @@ class Encoding:
     name : str
         The word after the colon in ``ggx:roughness``.
     stored : Parameter
-        Name, symbol and range of the stored value.
+        Name, symbol and ranges of the stored value.
     decode, encode : callable
         Stored value to parameter, and back; elementwise on arrays.
     formula : str
@@ -121,14 +135,14 @@ class Encoding:
 
 ROUGHNESS = Encoding(
     "roughness",
-    Parameter("roughness", "r", 0.0, 1.0, upper_closed=True, usual="0 < r ≤ 1"),
+    Parameter("roughness", "r", (0.1, 0.9), 0.0, 1.0, upper_closed=True),
     np.square,
     np.sqrt,
     "α = r²",
 )
 GLOSSINESS = Encoding(
     "glossiness",
-    Parameter("glossiness", "g", 0.0, 1.0, lower_closed=True, usual="0 ≤ g < 1"),
+    Parameter("glossiness", "g", (0.1, 0.9), 0.0, 1.0, lower_closed=True, larger_is_smoother=True),
     lambda stored: np.square(1 - stored),
     lambda alpha: 1 - np.sqrt(alpha),
     "α = (1 − g)²",

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.evaluation import Array, tangent_square
+from mdfconv.distributions.declarations import MapVariables, Printed, same
+from mdfconv.distributions.evaluation import Array, negative_log_tail, tangent_square
 from mdfconv.distributions.parameter import Parameter
 
 _NEWTON_STEPS = 12
@@ -18,16 +19,29 @@ class Sawicki(Distribution):
 
         D̄ = 256 c / ((1−N) c + N + 3)⁴ = c / (1 + ¼ (N−1) v)⁴.
 
-    Normalized by 96 (3+N) / (256 π). The second form has no difference of large numbers;
-    v = t²/(s(1+s)) and c = 1/s come from t = tan β, s = √(1+t²).
+    Normalized by 96 (3+N) / (256 π); F = 1 − [c / (1 + ¼ (N−1) v)]³. The second form has no
+    difference of large numbers; v = t²/(s(1+s)) and c = 1/s come from t = tan β, s = √(1+t²).
     """
 
     name = "sawicki"
     unit_formula = "256 cos β / ((1−N) cos β + N + 3)⁴"
     normalized_formula = "96 (3+N) cos β / (π ((1−N) cos β + N + 3)⁴)"
     source = "Sawicki 2006"
-    parameter = Parameter("exponent", "N_DS", usual="N_DS ≥ 1")
+    parameters = (Parameter("exponent", "N_DS", (1.0, 1e4), larger_is_smoother=True),)
     operations = 6
+    map_variables = MapVariables(
+        width=lambda n: np.sqrt(8 / (3 * n + 9)),
+        from_width=lambda x: 8 / (3 * x * x) - 3,
+        concentration=same,
+        from_map=lambda x, product: product / (x * x),
+    )
+    printed = Printed(
+        lambda beta, n: 256 * np.cos(beta) / ((1 - n) * np.cos(beta) + n + 3) ** 4,
+        lambda n: 96 * (3 + n) / (256 * np.pi),
+        from_cosine=lambda c: (c + 3 - 4 * (2 * c) ** 0.25) / (c - 1),
+        peak_alpha=lambda n: np.sqrt(8 / (3 * (n + 3))),
+        from_peak_alpha=lambda alpha: 8 / (3 * alpha**2) - 3,
+    )
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         value = tangent_square(beta, out)
@@ -62,6 +76,23 @@ class Sawicki(Distribution):
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return parameter / (parameter + 3)
+
+    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        square = tangent_square(beta)
+        secant = np.sqrt(1 + square)
+        drop = square / (secant * (1 + secant))
+        k = 0.25 * (parameter - 1)
+        # With q = 1 − c/(1+kv) both are sums of positive terms.
+        ratio = 1 / (secant * (1 + k * drop))
+        q = (1 + k) * drop / (1 + k * drop)
+        return q * (3 * ratio + q * q), ratio**3
+
+    def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
+        # 1 − q for q³ of the tail, from the side that has the digits.
+        q = -np.expm1(-negative_log_tail(lobe, tail) / 3)
+        k = 0.25 * (parameter - 1)
+        drop = q / (1 + k * (1 - q))
+        return 2 * np.arcsin(np.sqrt(0.5 * drop))
 
     def _half_tangent(self, parameter: Array) -> Array:
         # ½ (1 + kv)⁴ = 1 − v, k = (N−1)/4: convex and rising in v, so Newton steps from a point

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from mdfconv.distributions.base import Distribution
+from mdfconv.distributions.declarations import (
+    Equivalent,
+    MapVariables,
+    Printed,
+    inverse_square_over_pi,
+    same,
+)
 from mdfconv.distributions.double_double import distance_to_cosine
 from mdfconv.distributions.evaluation import Array, tangent_square
 from mdfconv.distributions.parameter import Parameter
@@ -14,7 +22,15 @@ from mdfconv.distributions.parameter import Parameter
 # Where y = x/m is smaller than this, 1 − w is a difference of numbers that agree in too many digits
 # for the type at hand.
 _JUST_BEYOND = 1 + 1e-6
+# Before 80 halvings of the logarithm of w, which leave the rounding.
+_SMALLEST_DROP, _HALVINGS = 1e-20, 80
 _EDGE = {np.dtype(np.float32): 1e-2, np.dtype(np.float64): 5e-4}
+
+
+def _printed_unit(beta: Any, m: Any) -> Any:
+    c = np.cos(beta)
+    x = c + m - 1
+    return np.where(x > 0, m**5 * x / (c * (m * x**2 - x**2 + m**2) ** 2), 0)
 
 
 class Schlick(Distribution):
@@ -25,16 +41,30 @@ class Schlick(Distribution):
         D̄ = m⁵ x / (cos β (m x² − x² + m²)²)
            = y / (cos β (1 + (1−m)/m · w (2−w))²),   w = (1 − cos β)/m, y = 1 − w = x/m.
 
-    Normalized by 1/(π m²), exactly. The parameter is Beckmann's m. The second form has no
-    difference that vanishes for smooth surfaces; 1 − cos β = 2 sin²(β/2) keeps its digits.
+    Normalized by 1/(π m²), exactly; F = q/(m + (1−m) q) with q = 1 − y², 1 beyond the edge. The
+    parameter is Beckmann's m. The second form has no difference that vanishes for smooth surfaces;
+    1 − cos β = 2 sin²(β/2) keeps its digits.
     """
 
     name = "schlick"
     unit_formula = "m⁵ x / (cos β (m x² − x² + m²)²), x = cos β + m − 1; 0 where x < 0"
     normalized_formula = "m³ x / (π cos β (m x² − x² + m²)²)"
     source = "Schlick 1994, An Inexpensive BRDF Model for Physically-Based Rendering"
-    parameter = Parameter("alpha", "m_B", upper=1.0, upper_closed=True, usual="0 < m_B ≤ 1")
+    parameters = (Parameter("alpha", "m_B", (0.01, 0.8), upper=1.0, upper_closed=True),)
     operations = 8
+    equivalent = Equivalent(
+        "beckmann",
+        same_lobe=False,
+        forward_text="schlick has beckmann's m_B",
+        backward_text="schlick has beckmann's m_B",
+    )
+    map_variables = MapVariables(
+        width=same,
+        from_width=same,
+        concentration=lambda m: (1 - m) * (1 + m) / (m * m),
+        from_map=lambda x, product: np.minimum(x / np.sqrt(x * x + product), 1),
+    )
+    printed = Printed(_printed_unit, inverse_square_over_pi, peak_alpha=same, from_peak_alpha=same)
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         # Angles often come sorted or in tiles: of whole blocks beyond the edge nothing is computed.
@@ -80,6 +110,37 @@ class Schlick(Distribution):
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return np.full_like(parameter, -2)
+
+    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        angle, m = np.broadcast_arrays(beta, parameter)
+        w = np.minimum(2 * np.square(np.sin(0.5 * angle)) / m, 1)
+        y = 1 - w
+        _sharpen_edge(y, angle, m)
+        np.maximum(y, 0, out=y)
+        q = w * (2 - w)
+        below = m + (1 - m) * q
+        return q / below, m * np.square(y) / below
+
+    def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
+        # 1 − q = y² = (1 − F)/(1 − (1−m) F), and w = q/(1 + y).
+        below = 1 - (1 - parameter) * lobe
+        y = np.sqrt(tail / below)
+        w = parameter * lobe / below / (1 + y)
+        return 2 * np.arcsin(np.sqrt(0.5 * parameter * w))
+
+    def _half_tangent(self, parameter: Array) -> Array:
+        # ½ (1 − m w)(1 + (1−m)/m · w (2−w))² = 1 − w, by halving the logarithm of w: a smooth lobe
+        # has it near 0.1 m, a rough one next to the edge at 1.
+        low, high = np.full_like(parameter, _SMALLEST_DROP), np.ones_like(parameter)
+        bend = (1 - parameter) / parameter
+        for _ in range(_HALVINGS):
+            w = np.sqrt(low * high)
+            above = 0.5 * (1 - parameter * w) * np.square(1 + bend * w * (2 - w)) < 1 - w
+            low, high = np.where(above, w, low), np.where(above, high, w)
+        drop = parameter * low
+        tangent = np.sqrt(drop * (2 - drop)) / (1 - drop)
+        # At m = 1 the lobe is uniform.
+        return np.where(parameter < 1, tangent, np.nan)
 
     def edge(self, parameter: Array) -> Array:
         """Return the end of the support, cos β = 1 − m."""

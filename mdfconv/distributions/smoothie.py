@@ -2,14 +2,35 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.evaluation import Array, inverse_square
-from mdfconv.distributions.ggx import trowbridge_reitz
+from mdfconv.distributions.declarations import Equivalent, MapVariables, Printed
+from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
+from mdfconv.distributions.ggx import printed_cosine, printed_from_cosine, trowbridge_reitz
 from mdfconv.distributions.parameter import Parameter
 
 _EXCESS = np.sqrt(2) - 1
+
+
+def to_ggx(alpha: Array) -> Array:
+    """Return the α of the GGX that equals Smoothie's α: α/√(4+α²)."""
+    return alpha / np.hypot(2, alpha)
+
+
+def from_ggx(alpha: Array) -> Array:
+    """Return Smoothie's α for a GGX α < 1: 2α/√(1−α²); inf or NaN from 1 on."""
+    return 2 * alpha / np.sqrt((1 - alpha) * (1 + alpha))
+
+
+def _printed_to_ggx(alpha: Any) -> Any:
+    return alpha / np.sqrt(4 + alpha**2)
+
+
+def _printed_from_ggx(alpha: Any) -> Any:
+    return 2 * alpha / np.sqrt(1 - alpha**2)
 
 
 class Smoothie(Distribution):
@@ -26,8 +47,29 @@ class Smoothie(Distribution):
     unit_formula = "[α² / (α² + 4 sin²β)]²"
     normalized_formula = "(α²+4)/(π α²) [α² / (α² + 4 sin²β)]²"
     source = "Smoothie: an empirical BRDF (web article)"
-    parameter = Parameter("alpha", "α_s", usual="0 < α_s ≤ 1")
+    parameters = (Parameter("alpha", "α_s", (0.01, 0.8)),)
     operations = 6
+    equivalent = Equivalent(
+        "ggx",
+        forward=to_ggx,
+        backward=from_ggx,
+        forward_text="α = α_s/√(4+α_s²), exact",
+        backward_text="α_s = 2α/√(1−α²), exact",
+    )
+    map_variables = MapVariables(
+        width=to_ggx,
+        from_width=from_ggx,
+        concentration=lambda alpha: 4 / (alpha * alpha),
+        from_map=lambda x, product: 2 * x / np.sqrt(product),
+    )
+    printed = Printed(
+        lambda beta, alpha: (alpha**2 / (alpha**2 + 4 * np.sin(beta) ** 2)) ** 2,
+        lambda alpha: (alpha**2 + 4) / (np.pi * alpha**2),
+        cosine=lambda alpha: printed_cosine(_printed_to_ggx(alpha), np.full_like(alpha, 2)),
+        from_cosine=lambda c: _printed_from_ggx(printed_from_cosine(c, np.full_like(c, 2))),
+        peak_alpha=_printed_to_ggx,
+        from_peak_alpha=_printed_from_ggx,
+    )
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         return trowbridge_reitz(beta, 1 + 4 * inverse_square(parameter), out)
@@ -42,6 +84,13 @@ class Smoothie(Distribution):
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return -8 / (4 + np.square(parameter))
 
+    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        ratio = tangent_square(beta) * (1 + 4 * inverse_square(parameter))
+        return ratio / (1 + ratio), 1 / (1 + ratio)
+
+    def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
+        return np.arctan(to_ggx(parameter) * np.sqrt(lobe / tail))
+
     def _half_tangent(self, parameter: Array) -> Array:
         square = 0.25 * _EXCESS * np.square(parameter)
         return np.sqrt(square / (1 - square))
@@ -54,16 +103,6 @@ class Smoothie(Distribution):
 
     def _from_peak_alpha(self, alpha: Array) -> Array:
         return from_ggx(alpha)
-
-
-def to_ggx(alpha: Array) -> Array:
-    """Return the α of the GGX that equals Smoothie's α: α/√(4+α²)."""
-    return alpha / np.hypot(2, alpha)
-
-
-def from_ggx(alpha: Array) -> Array:
-    """Return Smoothie's α for a GGX α < 1: 2α/√(1−α²); inf or NaN from 1 on."""
-    return 2 * alpha / np.sqrt((1 - alpha) * (1 + alpha))
 
 
 DISTRIBUTION = Smoothie()

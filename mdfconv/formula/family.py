@@ -28,10 +28,13 @@ POWERS = {
     2.0: 1,
     4.0: 2,
 }
+# What lobes ask for: α, its square and its fourth power (an exponent of a roughness), a root (a
+# roughness of α), an inverse (α² of an exponent).
 _VARIABLES = (1.0, 2.0, 4.0, 0.5, -1.0)
 _FACTORS = (0.0, 1.0, 2.0, -1.0, -2.0, 0.5)
 # A fourth root is the root of a root.
 _OUTER = {1.0: 0, 2.0: 1, 0.5: SLOW, -0.5: SLOW, -1.0: SLOW, 0.25: 2 * SLOW, -0.25: 2 * SLOW}
+# With more coefficients the rounding of float32 takes what they add.
 _MOST_TERMS = 8
 _MOST_RATIONAL_TERMS = 4
 
@@ -70,7 +73,7 @@ class Shape:
 
 def shapes() -> Iterator[Shape]:
     """Yield every shape of the family, the cheapest first."""
-    found = {
+    family = {
         Shape(variable, factor, outer, numerator, denominator)
         for variable in _VARIABLES
         for factor in _FACTORS
@@ -80,7 +83,7 @@ def shapes() -> Iterator[Shape]:
         if numerator + denominator > 1 or variable == 1.0
     }
     key = lambda s: (s.operations, s.denominator, s.outer, s.factor, s.variable)  # noqa: E731
-    return iter(sorted(found, key=key))
+    return iter(sorted(family, key=key))
 
 
 def _sizes() -> list[tuple[int, int]]:

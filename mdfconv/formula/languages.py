@@ -1,10 +1,15 @@
 """Formulas as code to paste: GLSL, HLSL, C, Python and LaTeX.
 
-A new language is a `Dialect` and one entry in `_DIALECTS`; LaTeX is not code and stands apart.
+A new language of code is a `Dialect` that is added to `LANGUAGES`; LaTeX is not code and stands
+apart.
 """
 
 from __future__ import annotations
 
+import keyword
+import re
+import unicodedata
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -13,16 +18,51 @@ import numpy as np
 from mdfconv import __version__
 from mdfconv.conversion.endpoint import Endpoint
 from mdfconv.distributions.parameter import number_text
-from mdfconv.fitting.metrics import Display
 from mdfconv.formula.family import Formula
 from mdfconv.formula.search import Problem, is_glossy
+from mdfconv.registry import Registry
 
-_ASCII = str.maketrans({"α": "alpha"})
+# What an argument cannot be called: words of the emitted code, and of the languages. Words with
+# digits or capitals are not listed, as no argument has any.
+_WORDS = """
+    u v w sqrt sqrtf rsqrt inversesqrt
+
+    active alignas alignof asm asm_fragment atomic_uint attribute auto bool break buffer case cast
+    catch cbuffer centroid char class coherent column_major common compile compile_fragment const
+    const_cast constexpr continue default delete demote discard do double dword dynamic_cast else
+    enum explicit export extern external false filter fixed flat float for friend fxgroup goto
+    groupshared half highp if in inline inout input int interface invariant layout line lineadj
+    linear long lowp matrix mediump mutable namespace new noinline nointerpolation noperspective
+    nullptr operator out output packoffset partition pass patch pixelfragment point precise
+    precision private protected public readonly register reinterpret_cast resource restrict return
+    row_major sample sampler shared short signed sizeof smooth snorm stateblock static
+    static_assert static_cast string struct subroutine superp switch tbuffer technique template
+    texture this thread_local throw triangle triangleadj true try typedef typename typeof uint
+    uniform union unorm unsigned using varying vector vertexfragment virtual void volatile while
+    writeonly
+"""
+_TAKEN = {*_WORDS.split(), *keyword.kwlist}
+
+
+class Language(ABC):
+    """A form in which a formula is written.
+
+    Parameters
+    ----------
+    comment : str
+        What starts a comment line.
+    """
+
+    comment: str
+
+    @abstractmethod
+    def lines(self, formula: Formula, problem: Problem) -> list[str]:
+        """Return the lines of a formula, without the comment before it."""
 
 
 @dataclass(frozen=True)
-class Dialect:
-    """How a language writes what the formulas need.
+class Dialect(Language):
+    """How a programming language writes what the formulas need.
 
     Parameters
     ----------
@@ -47,6 +87,28 @@ class Dialect:
     inverse_root: str
     include: str = ""
 
+    def lines(self, formula: Formula, problem: Problem) -> list[str]:
+        """Return the lines of a function of the source's stored value."""
+        argument = argument_name(problem.source.stored.name)
+        constants, result = _body(formula, problem, self, argument)
+        return [
+            *([self.include] if self.include else []),
+            self.head.format(name=function_name(problem), argument=argument),
+            *(self.declare.format(name=name, value=value) for name, value in constants),
+            self.give.format(value=result),
+            *([self.foot] if self.foot else []),
+        ]
+
+
+class Latex(Language):
+    """The formula as LaTeX."""
+
+    comment = "%"
+
+    def lines(self, formula: Formula, problem: Problem) -> list[str]:
+        """Return the one line of an equation."""
+        return [latex(formula, problem)]
+
 
 def _plain(value: float) -> str:
     return str(np.float32(value))
@@ -59,17 +121,24 @@ _SHADER = {
     "give": "    return {value};",
     "foot": "}",
 }
-_DIALECTS = {
-    "glsl": Dialect(**_SHADER, number=_plain, root="sqrt({})", inverse_root="inversesqrt({})"),
-    "hlsl": Dialect(**_SHADER, number=_plain, root="sqrt({})", inverse_root="rsqrt({})"),
-    "c": Dialect(
+LANGUAGES: Registry[Language] = Registry("language")
+LANGUAGES.add(
+    "glsl", Dialect(**_SHADER, number=_plain, root="sqrt({})", inverse_root="inversesqrt({})")
+)
+LANGUAGES.add("hlsl", Dialect(**_SHADER, number=_plain, root="sqrt({})", inverse_root="rsqrt({})"))
+LANGUAGES.add(
+    "c",
+    Dialect(
         **_SHADER,
         number=lambda value: f"{_plain(value)}f",
         root="sqrtf({})",
         inverse_root="1.0f / sqrtf({})",
         include="#include <math.h>",
     ),
-    "python": Dialect(
+)
+LANGUAGES.add(
+    "python",
+    Dialect(
         comment="#",
         head="def {name}({argument}):",
         declare="    {name} = {value}",
@@ -79,8 +148,8 @@ _DIALECTS = {
         root="{} ** 0.5",
         inverse_root="{} ** -0.5",
     ),
-}
-LANGUAGES = (*_DIALECTS, "latex")
+)
+LANGUAGES.add("latex", Latex())
 
 
 def write_formula(formula: Formula, problem: Problem, language: str) -> str:
@@ -89,53 +158,73 @@ def write_formula(formula: Formula, problem: Problem, language: str) -> str:
     Parameters
     ----------
     formula : Formula
-        A formula that was found for the problem.
+        A formula for the problem.
     problem : Problem
         Its pair, metric and range.
     language : str
         One of `LANGUAGES`.
+
+    Raises
+    ------
+    MdfconvError
+        If the language is not known.
     """
-    if language == "latex":
-        facts = [f"% {line}" for line in _facts(formula, problem)]
-        return "\n".join([*facts, latex(formula, problem)])
-    dialect = _DIALECTS[language]
-    argument = problem.source.stored.name
-    lines, result = _body(formula, problem, dialect, argument)
-    return "\n".join(
-        [
-            *(f"{dialect.comment} {line}" for line in _facts(formula, problem)),
-            *([dialect.include] if dialect.include else []),
-            dialect.head.format(name=_name(problem), argument=argument),
-            *(dialect.declare.format(name=name, value=value) for name, value in lines),
-            dialect.give.format(value=result),
-            *([dialect.foot] if dialect.foot else []),
-        ]
+    form = LANGUAGES[language]
+    comments = [f"{form.comment} {line}" for line in _facts(formula, problem)]
+    return "\n".join([*comments, *form.lines(formula, problem)])
+
+
+def function_name(problem: Problem) -> str:
+    """Return an identifier that says what is computed, and γ where it is not the usual one."""
+    ends = []
+    for end in (problem.target, problem.source):
+        owner, second = end.distribution, end.distribution.second_parameter
+        gamma = ""
+        if second and owner.gamma != second.default:
+            gamma = f" {second.name} {number_text(owner.gamma)}"
+        ends.append(f"{owner.name}{gamma} {end.stored.name}")
+    return _identifier(" from ".join(ends))
+
+
+def argument_name(name: str) -> str:
+    """Return a parameter's name as that of an argument, ``_value`` after what has a meaning."""
+    identifier = _identifier(name).lower()
+    plain = identifier not in _TAKEN and not any(map(str.isdigit, identifier))
+    return identifier if plain else f"{identifier}_value"
+
+
+def _identifier(text: str) -> str:
+    # In GLSL two underscores in a row are reserved.
+    words = re.findall("[A-Za-z0-9]+", _ascii(text))
+    return "_".join(words if words and words[0][0].isalpha() else ["f", *words])
+
+
+def _ascii(text: str, greek: str = "{}") -> str:
+    """Return a text with its Greek letters spelled, in a form such as ``<{}>``."""
+    return "".join(
+        letter if letter.isascii() else greek.format(unicodedata.name(letter).split()[-1].lower())
+        for letter in text
     )
-
-
-def _name(problem: Problem) -> str:
-    sides = [
-        f"{side.distribution.name}_{side.stored.name}" for side in (problem.target, problem.source)
-    ]
-    return "_from_".join(sides).replace("-", "_")
 
 
 def _facts(formula: Formula, problem: Problem) -> list[str]:
     """Return what a reader of the code must know, in ASCII."""
-    sides = [
-        f"{side.label} {side.stored.symbol}".translate(_ASCII)
-        for side in (problem.source, problem.target)
-    ]
+    source, target = (_ascii(_end_text(end)) for end in (problem.source, problem.target))
     metric = problem.metric
-    exposure = f" at exposure {metric.exposure:g}" if isinstance(metric, Display) else ""
     of = " of 1 - g" if is_glossy(problem.target) else ""
     return [
-        f"{sides[0]} to {sides[1]}, for {number_text(problem.low)} to {number_text(problem.high)}.",
-        f"Least squares under the {metric.name} metric{exposure}: keeps the {metric.keeps}.",
+        f"{source} to {target}, for {number_text(problem.low)} to {number_text(problem.high)}.",
+        f"Least squares under the {metric} metric: keeps the {metric.keeps}.",
         f"Worst relative error{of} {formula.error:.2g} in float32; {formula.shape.operations} "
         "operations (+ - * count 1; / sqrt 1/sqrt count 4).",
         f"By mdfconv {__version__}.",
     ]
+
+
+def _end_text(end: Endpoint) -> str:
+    owner, second = end.distribution, end.distribution.second_parameter
+    gamma = f" at {second.symbol} = {number_text(owner.gamma)}" if second else ""
+    return f"{end.label} {end.stored.symbol}{gamma}"
 
 
 def _body(
@@ -143,11 +232,11 @@ def _body(
 ) -> tuple[list[tuple[str, str]], str]:
     """Return the constants of the function and the expression of its result."""
     shape = formula.shape
-    lines: list[tuple[str, str]] = []
+    constants: list[tuple[str, str]] = []
     one = dialect.number(1.0)
 
     def named(name: str, value: str) -> str:
-        lines.append((name, value))
+        constants.append((name, value))
         return name
 
     w = named("w", f"{one} - {argument}") if is_glossy(problem.source) else argument
@@ -165,7 +254,7 @@ def _body(
         value = f"{_enclosed(value) if not shape.factor else value} / ({down})"
     if shape.outer != 1:
         value = _raised(named("v", value), shape.outer, dialect, named)
-    return lines, f"{one} - {_enclosed(value)}" if is_glossy(problem.target) else value
+    return constants, f"{one} - {_enclosed(value)}" if is_glossy(problem.target) else value
 
 
 def _enclosed(value: str) -> str:
@@ -222,8 +311,8 @@ def latex(formula: Formula, problem: Problem) -> str:
     return f"{_latex_symbol(problem.target)} = {start}{value}"
 
 
-def _latex_symbol(side: Endpoint) -> str:
-    head, _, tail = side.stored.symbol.replace("α", r"\alpha").partition("_")
+def _latex_symbol(end: Endpoint) -> str:
+    head, _, tail = _ascii(end.stored.symbol, r"\{}").partition("_")
     return f"{head}_{{{tail}}}" if tail else head
 
 

@@ -14,19 +14,29 @@ from scipy.optimize import least_squares
 
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
-from mdfconv.distributions.gtr import GTR
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.gtr import HIGHEST_GAMMA, LOWEST_GAMMA
 from mdfconv.measured.samples import Samples
 
 LOSSES = ("linear", "log")
-_CANDIDATES = 120
+# Tangents of β_half from narrower than any measurement resolves to nearly uniform. Neighbours of
+# 120 differ by 13 %, which no valley of the cost falls between.
+_NARROWEST, _WIDEST, _CANDIDATES = 1e-5, 30.0, 120
+# Lobes of different γ are valleys of their own, and the lowest candidate need not lie in the
+# deepest: the best of each γ is refined.
 _GAMMAS = 9
-# Tangents of β_half from narrower than any measurement resolves to nearly uniform.
-_NARROWEST, _WIDEST = 1e-5, 30.0
+# Truncation of a central difference falls with h², rounding rises with ε/h: h = ε^(1/3).
+_STEP = float(np.finfo(float).eps) ** (1 / 3)
+# Nearer than this to an end of its range, relatively, γ is at the end.
+_AT_END = 1e-3
+# Gauss-Newton steps for the logarithms: at the right parameter six are exact under 50 % of noise.
 _LOG_STEPS = 12
-_SMALLEST_MODEL = 1e-3  # of the smallest sample, under the logarithmic loss
-_LOG_GAMMA_RANGE = (float(np.log(LOWEST_GAMMA)), float(np.log(HIGHEST_GAMMA)))
+# Of the smallest sample, under the logarithmic loss: a model is kept positive, far from where a
+# fit ends.
+_SMALLEST_MODEL = 1e-3
+# Values that a scan holds at a time: 16 MB.
+_SCANNED_AT_ONCE = 2_000_000
+# Inside the bounds by this, in a logarithm: the solver starts between them.
+_INSIDE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -36,9 +46,9 @@ class LobeFit:
     Parameters
     ----------
     distribution : Distribution
-        The distribution; for GTR with the fitted γ.
+        The distribution, with the fitted γ if it has one.
     parameters, errors : tuple of float
-        The parameter (and γ for GTR), and their standard errors.
+        The parameter (and γ where it was fitted), and their standard errors.
     offset, scale : tuple of float
         One of each for every channel.
     rmse, log_rmse : float
@@ -60,9 +70,12 @@ class LobeFit:
 
     @property
     def at_limit(self) -> bool:
-        """Whether γ of GTR lies at the end of the range that is searched."""
-        ends = LOWEST_GAMMA * 1.001, HIGHEST_GAMMA * 0.999
-        return len(self.parameters) > 1 and not ends[0] < self.parameters[1] < ends[1]
+        """Whether a fitted γ lies at the end of the range that is searched."""
+        second = self.distribution.second_parameter
+        if second is None or len(self.parameters) < 2:
+            return False
+        low, high = second.fit_range
+        return not low * (1 + _AT_END) < self.parameters[1] < high * (1 - _AT_END)
 
     def model(self, beta: Array, quantity: str) -> Array:
         """Return the model at angles (radians), shape (n, channels)."""
@@ -85,12 +98,12 @@ def fit_lobe(
     data : Samples
         The measurements.
     target : Distribution
-        What to fit; GTR with γ free unless `gamma` is given.
+        What to fit; γ of a distribution of two parameters is free unless `gamma` is given.
     loss : str
         ``"linear"``: squared residuals. ``"log"``: squared residuals of the logarithms; only
         positive samples count.
     gamma : float, optional
-        γ of GTR.
+        γ of a distribution that has one; the others do not ask for it.
 
     Returns
     -------
@@ -100,20 +113,12 @@ def fit_lobe(
     Raises
     ------
     MdfconvError
-        If there are fewer samples than unknowns, or nothing to fit.
+        If there are fewer samples than unknowns, nothing to fit, or γ is illegal.
     """
     problem = _Problem(data, target, loss, gamma)
-    found = least_squares(
-        problem.residual,
-        problem.start(),
-        problem.slope,
-        bounds=problem.bounds,
-        xtol=1e-12,
-        ftol=1e-14,
-        gtol=1e-14,
-        x_scale="jac",
-    )
-    return problem.report(found.x)
+    solutions = [problem.refine(start) for start in problem.starts()]
+    _, point = min(solutions, key=lambda solution: solution[0])
+    return problem.report(point)
 
 
 def simplest(fits: list[LobeFit], tolerance: float, loss: str) -> LobeFit:
@@ -121,18 +126,18 @@ def simplest(fits: list[LobeFit], tolerance: float, loss: str) -> LobeFit:
 
     Cheapest has the fewest parameters, then the fewest operations per evaluation.
     """
-    best = min(_error(entry, loss) for entry in fits)
-    good = [entry for entry in fits if _error(entry, loss) <= (1 + tolerance) * best]
-    return min(good, key=lambda entry: (len(entry.parameters), entry.distribution.operations))
+    best = min(_error(fit, loss) for fit in fits)
+    good = [fit for fit in fits if _error(fit, loss) <= (1 + tolerance) * best]
+    return min(good, key=lambda fit: (len(fit.parameters), fit.distribution.operations))
 
 
 def rank(fits: list[LobeFit], loss: str) -> list[LobeFit]:
     """Return fits by the error of the loss, the smallest first."""
-    return sorted(fits, key=lambda entry: _error(entry, loss))
+    return sorted(fits, key=lambda fit: _error(fit, loss))
 
 
-def _error(entry: LobeFit, loss: str) -> float:
-    return entry.log_rmse if loss == "log" else entry.rmse
+def _error(fit: LobeFit, loss: str) -> float:
+    return fit.log_rmse if loss == "log" else fit.rmse
 
 
 class _Problem:
@@ -140,10 +145,11 @@ class _Problem:
 
     def __init__(self, data: Samples, target: Distribution, loss: str, gamma: float | None) -> None:
         if loss not in LOSSES:
-            raise MdfconvError(f"unknown loss '{loss}'; known: {', '.join(LOSSES)}")
+            raise MdfconvError(f"unknown loss '{loss}'", f"known: {', '.join(LOSSES)}")
         self._log = loss == "log"
-        self._target = GTR(gamma) if gamma is not None and isinstance(target, GTR) else target
-        self._free_gamma = isinstance(target, GTR) and gamma is None
+        second = target.second_parameter
+        self._target = target if second is None or gamma is None else target.with_gamma(gamma)
+        self._gamma_range = second.fit_range if second and gamma is None else None
         keep = (data.values > 0).all(axis=1) if self._log else np.ones(data.beta.size, bool)
         self._data, self._beta, self._values = data, data.beta[keep], data.values[keep]
         self._cosine = foreshortening(self._beta, data.quantity)
@@ -151,17 +157,29 @@ class _Problem:
         # In units of the largest value, whatever the measurement's.
         self._unit = float(np.max(np.abs(self._values)))
         self._values = self._values / self._unit
+        self._candidates = self._scanned()
+        logarithms = np.concatenate([points[:, 0] for points in self._candidates])
+        # Beyond the candidates a lobe is narrower than the angles resolve, or nearly uniform.
+        upper = min(np.log(self._target.parameter.upper), logarithms.max() + 5)
+        ends = [(logarithms.min() - 1, upper)]
+        if self._gamma_range:
+            ends.append(tuple(np.log(self._gamma_range)))
+        self._bounds = tuple(np.array(ends).T)
+
+    def _scanned(self) -> list[Array]:
+        """Return points of every half width for each γ of a grid, shape (candidates, unknowns)."""
         tangents = np.geomspace(_NARROWEST, _WIDEST, _CANDIDATES)
-        candidates = self._target.from_half_tangent(tangents)
-        self._candidates = np.log(np.sort(candidates[np.isfinite(candidates)]))
-        upper = min(np.log(self._target.parameter.upper), self._candidates[-1] + 5)
-        ends = [(self._candidates[0] - 1, upper)]
-        if self._free_gamma:
-            ends.append(_LOG_GAMMA_RANGE)
-        self.bounds = tuple(np.array(ends).T)
+        if self._gamma_range is None:
+            return [_logarithms(self._target.from_half_tangent(tangents))[:, None]]
+        points = []
+        for gamma in np.geomspace(*self._gamma_range, _GAMMAS):
+            target = self._target.with_gamma(float(gamma))
+            first = _logarithms(target.from_half_tangent(tangents))
+            points.append(np.stack([first, np.full_like(first, np.log(gamma))], axis=1))
+        return points
 
     def _check(self) -> None:
-        unknowns = 2 * self._values.shape[1] + 1 + self._free_gamma
+        unknowns = 2 * self._values.shape[1] + (2 if self._gamma_range else 1)
         angles = np.unique(self._beta).size
         if self._values.size <= unknowns or angles < 4:
             raise MdfconvError(
@@ -171,22 +189,44 @@ class _Problem:
         if np.ptp(self._values, axis=0).max() == 0:
             raise MdfconvError("all values are equal: there is no lobe to fit")
 
-    def start(self) -> Array:
-        """Return the best point of a scan over p (and γ)."""
-        gammas = np.linspace(*_LOG_GAMMA_RANGE, _GAMMAS) if self._free_gamma else [None]
-        points = [np.array([p] if g is None else [p, g]) for g in gammas for p in self._candidates]
-        costs = [float(np.sum(np.square(self.residual(point)))) for point in points]
-        lowest = points[int(np.argmin(costs))]
-        return np.clip(lowest, self.bounds[0] + 1e-9, self.bounds[1] - 1e-9)
+    def starts(self) -> list[Array]:
+        """Return the best point of a scan over p, for each γ of a grid if that is free."""
+        return [points[int(np.argmin(self._costs(points)))] for points in self._candidates]
+
+    def _costs(self, points: Array) -> Array:
+        """Return the cost of points of one γ, shape (candidates,)."""
+        block = max(1, _SCANNED_AT_ONCE // self._values.size)
+        blocks = [points[start : start + block] for start in range(0, len(points), block)]
+        return np.concatenate(
+            [np.sum(np.square(self._project(self._lobes(some))[0]), axis=(1, 2)) for some in blocks]
+        )
+
+    def refine(self, start: Array) -> tuple[float, Array]:
+        """Return the cost and the point of the minimum whose valley a point lies in."""
+        point = least_squares(
+            self.residual,
+            np.clip(start, self._bounds[0] + _INSIDE, self._bounds[1] - _INSIDE),
+            self.slope,
+            bounds=self._bounds,
+            xtol=1e-12,
+            ftol=1e-14,
+            gtol=1e-14,
+            x_scale="jac",
+        ).x
+        return self.cost(point), point
+
+    def cost(self, point: Array) -> float:
+        """Return the sum of the squared residuals."""
+        return float(np.sum(np.square(self.residual(point))))
 
     def residual(self, point: Array) -> Array:
         """Return the residuals that the best offsets and scales leave, flattened."""
-        return self._project(point)[0].ravel()
+        return self._project(self._lobe(point))[0].ravel()
 
     def slope(self, point: Array) -> Array:
         """Return ∂residual/∂point with the linear part projected out (Kaufman)."""
-        _, gain, _, scale = self._project(point)
-        lobe, slopes = self._lobe(point)
+        lobe, slopes = self._lobe(point), self._lobe_slopes(point)
+        _, gain, _, scale = self._project(lobe)
         columns = []
         for slope in slopes:
             moved = gain * slope[:, None] * scale
@@ -199,14 +239,14 @@ class _Problem:
 
     def report(self, point: Array) -> LobeFit:
         """Return the fit at a point, with standard errors from the full Jacobian."""
-        residual, gain, offset, scale = self._project(point)
+        lobe, slopes = self._lobe(point), self._lobe_slopes(point)
+        residual, gain, offset, scale = self._project(lobe)
         if not scale.any():
             raise MdfconvError("the values do not fall with the angle: there is no lobe to fit")
-        lobe, slopes = self._lobe(point)
         count, channels = residual.shape
         jacobian = np.zeros((count, channels, len(slopes) + 2 * channels))
-        for place, slope in enumerate(slopes):
-            jacobian[:, :, place] = gain * slope[:, None] * scale
+        for column, slope in enumerate(slopes):
+            jacobian[:, :, column] = gain * slope[:, None] * scale
         for channel in range(channels):
             jacobian[:, channel, len(slopes) + 2 * channel] = gain[:, channel]
             jacobian[:, channel, len(slopes) + 2 * channel + 1] = gain[:, channel] * lobe
@@ -214,13 +254,15 @@ class _Problem:
         unknowns = flat.shape[1]
         cost = float(np.sum(np.square(residual)))
         spread = np.sqrt(cost / (residual.size - unknowns)) * _standard_deviations(flat)
-        parameters = np.exp(point)
+        distribution, parameters = self._at(point), np.exp(point)
+        if self._gamma_range:
+            parameters[1] = distribution.gamma
         likelihood = residual.size * np.log(max(cost, np.finfo(float).tiny) / residual.size)
         if not self._log:
             likelihood += 2 * residual.size * np.log(self._unit)
-        model = offset + lobe[:, None] * scale
+        model = _model(lobe, offset, scale)
         return LobeFit(
-            distribution=self._at(point),
+            distribution=distribution,
             parameters=tuple(parameters.tolist()),
             errors=tuple((parameters * spread[: point.size]).tolist()),
             offset=tuple((self._unit * offset).tolist()),
@@ -232,54 +274,80 @@ class _Problem:
         )
 
     def _at(self, point: Array) -> Distribution:
-        return GTR(float(np.exp(point[1]))) if self._free_gamma else self._target
+        """Return the distribution with the γ of a point."""
+        second = self._target.second_parameter
+        if self._gamma_range is None or second is None:
+            return self._target
+        # exp(ln γ) rounds, and an end of the range may be the end of the legal values.
+        return self._target.with_gamma(float(np.clip(np.exp(point[1]), second.lower, second.upper)))
 
-    def _lobe(self, point: Array) -> tuple[Array, list[Array]]:
-        """Return the lobe and its slopes in the logarithms of the parameters."""
-        target = self._at(point)
-        alpha = np.exp(point[:1])[:, None]
-        with np.errstate(all="ignore"):
-            value, slope = target.with_slope(self._beta[None, :], alpha, normalized=False)
-            slopes = [slope[0] / self._cosine]
-            if isinstance(target, GTR) and self._free_gamma:
-                # ∂ ln (1+x)^(−γ) / ∂ ln γ is the logarithm itself.
-                logarithm = np.log(np.maximum(value[0], np.finfo(float).tiny))
-                slopes.append(value[0] * logarithm / self._cosine)
-        return value[0] / self._cosine, slopes
+    def _lobe(self, point: Array) -> Array:
+        """Return the lobe, of which the model is a multiple and an offset, shape (n,)."""
+        lobe: Array = self._lobes(point[None, :])[0]
+        return lobe
 
-    def _project(self, point: Array) -> tuple[Array, Array, Array, Array]:
-        """Return residuals, their gain ∂residual/∂model, offsets and scales."""
-        target = self._at(point)
-        alpha = np.exp(point[:1])[:, None]
+    def _lobes(self, points: Array) -> Array:
+        """Return the lobes of points of one γ, shape (points, n)."""
+        beta = np.broadcast_to(self._beta, (len(points), self._beta.size))
         with np.errstate(all="ignore"):
-            lobe = target.shape(self._beta[None, :], alpha)[0] / self._cosine
-        values = self._values
-        ones = np.ones_like(values)
+            return self._at(points[0]).shape(beta, np.exp(points[:, :1])) / self._cosine
+
+    def _lobe_slopes(self, point: Array) -> list[Array]:
+        """Return the slopes of the lobe in ln p, and in ln γ if that is free."""
+        with np.errstate(all="ignore"):
+            _, slope = self._at(point).with_slope(
+                self._beta[None, :], np.exp(point[:1])[:, None], normalized=False
+            )
+        slopes = [slope[0] / self._cosine]
+        if self._gamma_range:
+            low, high = (np.array([point[0], point[1] + step]) for step in (-_STEP, _STEP))
+            rise = self._lobe(high) - self._lobe(low)
+            # At an end of the legal values one-sided.
+            slopes.append(rise / np.log(self._at(high).gamma / self._at(low).gamma))
+        return slopes
+
+    def _project(self, lobe: Array) -> tuple[Array, Array, Array, Array]:
+        """Return residuals, their gain ∂residual/∂model, offsets and scales.
+
+        A lobe has shape (..., n), residuals and gain (..., n, channels), the others
+        (..., channels).
+        """
+        values, ones = self._values, np.ones_like(self._values)
         offset, scale = _solve(lobe, values, ones)
         if not self._log:
-            return offset + lobe[:, None] * scale - values, ones, offset, scale
+            return _model(lobe, offset, scale) - values, ones, offset, scale
         smallest = _SMALLEST_MODEL * values.min(axis=0)
         offset, scale = _solve(lobe, values, 1 / np.square(values))
         for _ in range(_LOG_STEPS):
-            model = np.maximum(offset + lobe[:, None] * scale, smallest)
+            model = np.maximum(_model(lobe, offset, scale), smallest)
             # One Gauss-Newton step for the logarithms is a weighted linear fit.
             working = model * (1 + np.log(values / model))
             offset, scale = _solve(lobe, working, 1 / np.square(model))
-        model = np.maximum(offset + lobe[:, None] * scale, smallest)
+        model = np.maximum(_model(lobe, offset, scale), smallest)
         return np.log(model / values), 1 / model, offset, scale
+
+
+def _model(lobe: Array, offset: Array, scale: Array) -> Array:
+    """Return offset + scale · lobe, shape (..., n, channels)."""
+    return offset[..., None, :] + lobe[..., None] * scale[..., None, :]
 
 
 def _solve(lobe: Array, values: Array, weight: Array) -> tuple[Array, Array]:
     """Return weighted least-squares offset and scale ≥ 0 of each channel."""
-    total = weight.sum(axis=0)
-    centre = (weight * lobe[:, None]).sum(axis=0) / total
-    mean = (weight * values).sum(axis=0) / total
-    centred = lobe[:, None] - centre
-    spread = (weight * np.square(centred)).sum(axis=0)
-    shared = (weight * centred * (values - mean)).sum(axis=0)
+    total = weight.sum(axis=-2)
+    centre = (weight * lobe[..., None]).sum(axis=-2) / total
+    mean = (weight * values).sum(axis=-2) / total
+    centred = lobe[..., None] - centre[..., None, :]
+    spread = (weight * np.square(centred)).sum(axis=-2)
+    shared = (weight * centred * (values - mean[..., None, :])).sum(axis=-2)
     # A lobe points outwards: a negative scale would be a hole.
     scale = np.where(spread > 0, np.maximum(shared, 0) / np.where(spread > 0, spread, 1), 0)
     return mean - scale * centre, scale
+
+
+def _logarithms(candidates: Array) -> Array:
+    """Return the logarithms of those that exist, ascending."""
+    return np.log(np.sort(candidates[np.isfinite(candidates)]))
 
 
 def _standard_deviations(jacobian: Array) -> Array:

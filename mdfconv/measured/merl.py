@@ -10,7 +10,9 @@ from mdfconv.errors import MdfconvError
 from mdfconv.measured.samples import Samples, samples
 
 _HEADER_BYTES = 12
+# Of R, G and B, by which the database's own reader multiplies.
 _SCALES = np.array([1.0, 1.15, 1.66]) / 1500
+# The database has 90 × 90 × 180; a file of other bytes has anything.
 _LARGEST_DIMENSION = 4096
 
 

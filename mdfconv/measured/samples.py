@@ -37,12 +37,29 @@ class Samples:
     notes: tuple[str, ...] = field(default=())
 
 
-# From an angle as stored to radians.
-UNITS: dict[str, Callable[[Array], Array]] = {
-    "degrees": np.radians,
-    "radians": np.asarray,
-    "cosine": np.arccos,
+@dataclass(frozen=True)
+class AngleUnit:
+    """How a file stores an angle.
+
+    Parameters
+    ----------
+    to_radians : callable
+        From the number stored.
+    largest : float
+        The largest such number; the smallest is 0.
+    """
+
+    to_radians: Callable[[Array], Array]
+    largest: float
+
+
+UNITS = {
+    "degrees": AngleUnit(np.radians, 90.0),
+    "radians": AngleUnit(np.asarray, np.pi / 2),
+    "cosine": AngleUnit(np.arccos, 1.0),
 }
+# Of the largest number of a unit: files hold rounded angles.
+_SLACK = 1e-6
 
 
 def samples(
@@ -63,7 +80,7 @@ def samples(
     angle : numpy.ndarray, shape (n,)
         Angles as stored.
     unit : str
-        ``"degrees"``, ``"radians"`` or ``"cosine"``.
+        One of `UNITS`.
     values, channels, quantity, notes
         As in `Samples`.
 
@@ -79,15 +96,14 @@ def samples(
     if not whole.any():
         raise MdfconvError(f"{path}: no row with finite numbers")
     angle, values = angle[whole], values[whole]
-    limits = {"degrees": (0.0, 90.0), "radians": (0.0, np.pi / 2), "cosine": (0.0, 1.0)}[unit]
-    slack = 1e-6 * limits[1]
-    outside = (angle < limits[0] - slack) | (angle > limits[1] + slack)
+    largest = UNITS[unit].largest
+    outside = (angle < -_SLACK * largest) | (angle > (1 + _SLACK) * largest)
     if outside.any():
         bad = float(angle[outside][0])
         raise MdfconvError(
-            f"{path}: {unit} {bad:g} is outside {limits[0]:g} to {limits[1]:.6g}, an angle from "
-            "the normal to the horizon"
+            f"{path}: {unit} {bad:g} is outside 0 to {largest:.6g}, an angle from the normal to "
+            "the horizon"
         )
-    beta = UNITS[unit](np.clip(angle, *limits))
+    beta = UNITS[unit].to_radians(np.clip(angle, 0, largest))
     order = np.argsort(beta, kind="stable")
     return Samples(beta[order], values[order], channels, quantity, notes)

@@ -12,6 +12,7 @@ from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.samples import UNITS, Samples, samples
 
+# What the name of a column says of its unit.
 _HINTS = {
     "cosine": re.compile(r"cos", re.I),
     "degrees": re.compile(r"deg|°", re.I),
@@ -41,7 +42,7 @@ class Columns:
     def refuse(self, path: Path, reason: str) -> None:
         """Raise if columns are chosen for a file that leaves no choice."""
         if self != Columns():
-            raise MdfconvError(f"{path}: {reason}: give no --angle, --angle-unit or --values")
+            raise MdfconvError(f"{path}: {reason}", "choose no columns and no unit")
 
 
 def read_text(path: Path, columns: Columns) -> Samples:
@@ -63,7 +64,7 @@ def read_text(path: Path, columns: Columns) -> Samples:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
         raise MdfconvError(
-            f"{path}: not UTF-8 text (byte {error.start + 1}); convert its encoding first"
+            f"{path}: not UTF-8 text (byte {error.start + 1})", "convert its encoding first"
         ) from None
     tags = dict(re.findall(r"^#\s*(DIM|PARAM_IN|PARAM_OUT)\s+(.+?)\s*$", "\n".join(lines), re.M))
     header, table = _table(path, lines)
@@ -74,7 +75,7 @@ def read_text(path: Path, columns: Columns) -> Samples:
     chosen = [_column(path, name, header, table) for name in columns.values]
     chosen = chosen or [index for index in range(table.shape[1]) if index != angle]
     if not chosen:
-        raise MdfconvError(f"{path}: one column is not enough: give an angle and a value")
+        raise MdfconvError(f"{path}: one column is not enough", "it takes an angle and a value")
     unit = _unit(path, columns.unit, header[angle], table[:, angle])
     names = tuple(header[index] for index in chosen)
     return samples(path, table[:, angle], unit, table[:, chosen], names, "ndf")
@@ -86,20 +87,20 @@ def _table(path: Path, lines: list[str]) -> tuple[list[str], Array]:
     rows = [(number, line) for number, line in rows if line and not line.startswith("#")]
     header: list[str] = []
     numbers: list[list[float]] = []
-    for place, (number, line) in enumerate(rows):
+    for index, (number, line) in enumerate(rows):
         cells = [cell.strip().strip('"') for cell in _split(line)]
         try:
             numbers.append([float(cell) if cell else np.nan for cell in cells])
         except ValueError:
-            if place:
+            if index:
                 raise MdfconvError(f"{path}, line {number}: not numbers: {line[:60]}") from None
             header = cells
     if not numbers:
         raise MdfconvError(f"{path}: no numeric rows")
     width = len(header or numbers[0])
-    for (number, _), found in zip(rows[len(rows) - len(numbers) :], numbers, strict=True):
-        if len(found) != width:
-            raise MdfconvError(f"{path}, line {number}: {len(found)} columns where {width} go")
+    for (number, _), row in zip(rows[len(rows) - len(numbers) :], numbers, strict=True):
+        if len(row) != width:
+            raise MdfconvError(f"{path}, line {number}: {len(row)} columns where {width} go")
     return header or [str(index + 1) for index in range(width)], np.array(numbers)
 
 
@@ -111,43 +112,46 @@ def _split(line: str) -> list[str]:
 
 
 def _column(path: Path, name: str, header: list[str], table: Array) -> int:
-    lowered = [entry.lower() for entry in header]
+    lowered = [heading.lower() for heading in header]
     if name.lower() in lowered:
         return lowered.index(name.lower())
     if name.isdecimal() and 1 <= int(name) <= table.shape[1]:
         return int(name) - 1
-    raise MdfconvError(f"{path}: no column '{name}'; there are {', '.join(header)}")
+    raise MdfconvError(f"{path}: no column '{name}'", f"there are {', '.join(header)}")
 
 
 def _unit(path: Path, wanted: str | None, name: str, angle: Array) -> str:
     if wanted:
         known = [unit for unit in UNITS if unit.rstrip("s") == wanted.lower().rstrip("s")]
         if not known:
-            raise MdfconvError(f"unknown angle unit '{wanted}'; known: {', '.join(UNITS)}")
+            raise MdfconvError(f"unknown angle unit '{wanted}'", f"known: {', '.join(UNITS)}")
         return known[0]
-    for unit, hint in _HINTS.items():
-        if hint.search(name):
+    for unit, pattern in _HINTS.items():
+        if pattern.search(name):
             return unit
-    if np.nanmax(angle) > np.pi / 2 * (1 + 1e-6):
+    if np.nanmax(angle) > UNITS["radians"].largest * (1 + 1e-6):
         return "degrees"
     raise MdfconvError(
-        f"{path}: column '{name}' does not say whether it holds degrees, radians or cosines; "
-        "give --angle-unit"
+        f"{path}: column '{name}' does not say whether it holds degrees, radians or cosines",
+        "name the unit of the angles",
+        argument="angle_unit",
     )
 
 
 def _alta(path: Path, tags: dict[str, str], table: Array) -> Samples:
     """Interpret ALTA's header: one input dimension, any number of outputs."""
     dimensions = tags["DIM"].split()
-    given = tags.get("PARAM_IN", "").strip().upper()
+    parametrization = tags.get("PARAM_IN", "").strip().upper()
     if len(dimensions) < 2 or dimensions[0] != "1" or not dimensions[1].isdecimal():
-        raise MdfconvError(f"{path}: ALTA data of dimension '{tags['DIM']}'; only 1 N is read")
+        raise MdfconvError(f"{path}: ALTA data of dimension '{tags['DIM']}'", "only 1 N is read")
     outputs = int(dimensions[1])
-    if given not in _ALTA_INPUTS:
+    if parametrization not in _ALTA_INPUTS:
         raise MdfconvError(
-            f"{path}: ALTA input parametrization '{given}'; known: {', '.join(_ALTA_INPUTS)}"
+            f"{path}: ALTA input parametrization '{parametrization}'",
+            f"known: {', '.join(_ALTA_INPUTS)}",
         )
     if not 1 <= outputs < table.shape[1]:
         raise MdfconvError(f"{path}: {table.shape[1]} columns do not hold 1 + {outputs} dimensions")
     names = ("R", "G", "B") if outputs == 3 else tuple(str(n + 1) for n in range(outputs))
-    return samples(path, table[:, 0], _ALTA_INPUTS[given], table[:, 1 : 1 + outputs], names, "brdf")
+    unit = _ALTA_INPUTS[parametrization]
+    return samples(path, table[:, 0], unit, table[:, 1 : 1 + outputs], names, "brdf")

@@ -1,1 +1,1 @@
-"""What the project reproduces and shows: tables and figures as data, files and text."""
+"""The pages of the report folder, and their index."""

@@ -6,9 +6,9 @@ import numpy as np
 
 from mdfconv.measured.lobe_fit import LobeFit
 from mdfconv.measured.samples import Samples
-from mdfconv.reports.figures import PAGE, encoded, line_style, pyplot
+from mdfconv.output.figures import PAGE, encoded, line_style, pyplot
 
-_POINTS = 600
+_POINTS = 600  # of a curve, one a pixel
 
 
 def draw_fits(data: Samples, fits: list[LobeFit], title: str) -> bytes:
@@ -32,15 +32,15 @@ def draw_fits(data: Samples, fits: list[LobeFit], title: str) -> bytes:
     upper.plot(degrees, data.values[:, 0], "o", color="0.6", markersize=3, label="data")
     for fit in fits:
         style = line_style(fit.distribution.name)
-        symbols = fit.distribution.parameter.symbol, "γ"
+        fitted = fit.distribution.parameters[: len(fit.parameters)]
         values = ", ".join(
-            f"{symbol} = {value:.4g}"
-            for symbol, value in zip(symbols, fit.parameters, strict=False)
+            f"{parameter.symbol} = {value:.4g}"
+            for parameter, value in zip(fitted, fit.parameters, strict=True)
         )
         label = f"{fit.distribution.name}, {values}"
         upper.plot(np.degrees(beta), fit.model(beta, data.quantity)[:, 0], label=label, **style)
-        rest = fit.model(data.beta, data.quantity)[:, 0] - data.values[:, 0]
-        lower.plot(degrees, rest, **style)
+        residuals = fit.model(data.beta, data.quantity)[:, 0] - data.values[:, 0]
+        lower.plot(degrees, residuals, **style)
     upper.set_title(title)
     upper.set_ylabel("BRDF [1/sr]" if data.quantity == "brdf" else "distribution")
     upper.legend(fontsize=8)

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from mdfconv.brdf.fresnel import SMOOTHIE_FIT
-from mdfconv.brdf.fresnel_fit import EDGES, FresnelFit, fit, rescaled
-from mdfconv.brdf.fresnel_fit import grid as fine_grid
+from mdfconv.brdf.fresnel_fit import EDGES, FresnelFit, fit, grid, rescaled
 from mdfconv.distributions.evaluation import Array
-from mdfconv.reports.figures import PAGE, encoded, pyplot
-from mdfconv.reports.text import csv_text, file_bytes, markdown_text, rounded_rows
+from mdfconv.output.figures import PAGE, encoded, pyplot
+from mdfconv.output.files import file_bytes
+from mdfconv.output.records import csv_text, markdown_text, rounded_rows
+from mdfconv.reports.artefact import Artefact
 
 COLUMNS = ("curve", "a", "b", "weighted_rms", "cosine", "max_error", "rms_error")
 _DRAWN_IORS = (1.33, 1.4, 1.5)  # water, the article's, glass
@@ -31,36 +32,41 @@ _STYLES: dict[str, tuple[str, Any]] = {
 _POINTS = 101
 
 
-def error_rows(found: FresnelFit) -> list[dict[str, Any]]:
+def error_rows(fitted: FresnelFit) -> list[dict[str, Any]]:
     """Return a row for each approximation and range of the cosine l·H; the last one is all.
 
     ``a`` and ``b`` are None for the approximations that have none.
     """
-    constants = {"fit": (found.a, found.b), "printed": SMOOTHIE_FIT}
+    constants = {"fit": (fitted.a, fitted.b), "printed": SMOOTHIE_FIT}
     rows = []
-    for name, curve in found.curves().items():
+    for name, curve in fitted.curves().items():
         a, b = constants.get(name, (None, None))
-        weighted = found.weighted_error(curve)
+        weighted = fitted.weighted_error(curve)
         for low, high in [*pairwise(EDGES), (EDGES[0], EDGES[-1])]:
-            largest, rms = found.errors(curve, low, high)
+            largest, rms = fitted.errors(curve, low, high)
             values = name, a, b, weighted, f"{low:g} to {high:g}", largest, rms
             rows.append(dict(zip(COLUMNS, values, strict=True)))
     return rows
 
 
-def fresnel_page() -> tuple[dict[str, bytes], str]:
-    """Return the files of the page by name, and its result in a line."""
-    found = fit()
-    rows = error_rows(found)
-    tables = _constants_table(rows), _range_table(rows)
+def fresnel_page() -> Artefact:
+    """Return Smoothie's Fresnel term beside the exact curves."""
+    fitted = fit()
+    rows = error_rows(fitted)
+    text = [_prose(rows), _constants_table(rows), _range_prose(fitted), _range_table(rows)]
     files = {
-        "fresnel.csv": file_bytes(_csv(found)),
-        "fresnel.md": file_bytes("\n\n".join([_PROSE, tables[0], _RANGES, tables[1]])),
-        "fresnel.png": draw_fresnel(found),
+        "fresnel.csv": file_bytes(_csv(fitted)),
+        "fresnel.md": file_bytes("\n\n".join(text)),
+        "fresnel.png": draw_fresnel(fitted),
     }
-    off = max(abs(found.a / SMOOTHIE_FIT[0] - 1), abs(found.b / SMOOTHIE_FIT[1] - 1))
-    summary = f"a = {found.a:.4f}, b = {found.b:.4f}: within {100 * off:.1f} % of the printed ones"
-    return files, summary
+    off = max(abs(fitted.a / SMOOTHIE_FIT[0] - 1), abs(fitted.b / SMOOTHIE_FIT[1] - 1))
+    constants = f"a = {fitted.a:.4f}, b = {fitted.b:.4f}"
+    return Artefact(
+        files,
+        "Smoothie, the fit of the Fresnel term",
+        f"{constants}: within {100 * off:.1f} % of the printed ones",
+        "mdfconv fresnel",
+    )
 
 
 def _constants_table(rows: list[dict[str, Any]]) -> str:
@@ -81,34 +87,34 @@ def _range_table(rows: list[dict[str, Any]]) -> str:
     return markdown_text(["l·H", *names], list(shown.values()))
 
 
-def _csv(found: FresnelFit) -> str:
+def _csv(fitted: FresnelFit) -> str:
     cosine = np.linspace(0, 1, _POINTS)
     columns: dict[str, Array] = {"cosine": cosine}
     columns |= {f"exact {ior:g}": rescaled(cosine, ior) for ior in _DRAWN_IORS}
-    columns |= {name: curve(cosine) for name, curve in found.curves().items()}
+    columns |= {name: curve(cosine) for name, curve in fitted.curves().items()}
     return csv_text(list(columns), rounded_rows(columns))
 
 
-def draw_fresnel(found: FresnelFit, dpi: int = 110) -> bytes:
+def draw_fresnel(fitted: FresnelFit, dpi: int = 110) -> bytes:
     """Return a PNG: the article's curves, and the errors of the approximations.
 
     Parameters
     ----------
-    found : FresnelFit
+    fitted : FresnelFit
         The fit; its index of refraction is drawn beside the article's three.
     dpi : int
         Resolution.
     """
     figure, (left, right) = pyplot().subplots(1, 2, figsize=(PAGE[0] * 1.35, PAGE[1] * 0.85))
-    cosine = fine_grid()
-    iors = dict.fromkeys([*_DRAWN_IORS, found.ior])
+    cosine = grid()
+    iors = dict.fromkeys([*_DRAWN_IORS, fitted.ior])
     for ior, drawn in zip(iors, _EXACT_STYLES, strict=False):
         style = _line(drawn, 1.1)
         left.plot(cosine, rescaled(cosine, ior), label=f"exact, IOR {ior:g}", **style)
-    exact = rescaled(cosine, found.ior)
-    for name, curve in found.curves().items():
+    exact = rescaled(cosine, fitted.ior)
+    for name, curve in fitted.curves().items():
         style = _line(_STYLES[name], 1.6)
-        left.plot(cosine, curve(cosine), label=_label(name, found), **style)
+        left.plot(cosine, curve(cosine), label=_label(name, fitted), **style)
         right.plot(cosine, curve(cosine) - exact, **style)
     left.set(
         xlabel="l·H",
@@ -116,21 +122,21 @@ def draw_fresnel(found: FresnelFit, dpi: int = 110) -> bytes:
         title="Rescaled reflectance: grazing at 0, along the normal at 1",
         ylim=(-0.02, 1.02),
     )
-    _draw_weight(right, cosine, found)
+    _draw_weight(right, cosine, fitted)
     right.set(
         xlabel="l·H",
         ylabel="approximation − exact",
-        title=f"Error at IOR {found.ior:g}; grey: the weight of the fit",
+        title=f"Error at IOR {fitted.ior:g}; grey: the weight of the fit",
         ylim=(-0.12, 0.12),
     )
     figure.legend(loc="outside lower center", ncols=4)
     return encoded(figure, dpi=dpi)
 
 
-def _draw_weight(axes: Any, cosine: Array, found: FresnelFit) -> None:
+def _draw_weight(axes: Any, cosine: Array, fitted: FresnelFit) -> None:
     """Shade the weight from the bottom of the axes, on a scale of its own."""
     scale = axes.twinx()
-    scale.fill_between(cosine, found.weight(cosine), color="0.9", linewidth=0)
+    scale.fill_between(cosine, fitted.weight(cosine), color="0.9", linewidth=0)
     scale.set(ylim=(0, 2.5), yticks=[])
     scale.set_zorder(axes.get_zorder() - 1)
     axes.patch.set_visible(False)
@@ -140,15 +146,18 @@ def _line(style: tuple[str, Any], width: float) -> dict[str, Any]:
     return {"color": style[0], "linestyle": style[1], "linewidth": width}
 
 
-def _label(name: str, found: FresnelFit) -> str:
-    constants = {"fit": (found.a, found.b), "printed": SMOOTHIE_FIT}
+def _label(name: str, fitted: FresnelFit) -> str:
+    constants = {"fit": (fitted.a, fitted.b), "printed": SMOOTHIE_FIT}
     if name not in constants:
         return name
     a, b = constants[name]
     return f"{name}, a = {a:.4f}, b = {b:.4f}"
 
 
-_PROSE = """\
+def _prose(rows: list[dict[str, Any]]) -> str:
+    weighted = {row["curve"]: row["weighted_rms"] for row in rows}
+    schlick, gaussian = (weighted[name] / weighted["fit"] for name in ("(1-x)^5", "exp(-6x)"))
+    return f"""\
 # Smoothie's Fresnel term, fitted anew
 
 ![Fresnel curves and the errors of their approximations](fresnel.png)
@@ -159,13 +168,17 @@ that l·h = 2x². Its a and b were fitted to the exact reflectance at IOR 1.4, m
 weight is read as one in l·h and the grid as uniform in l·H; a weight in l·H gives others. Of the
 last half per cent the article says nothing.
 
-`weighted_rms` is what the fit minimizes: under the weight the term is four times nearer to the
-exact curve than Schlick's, and a quarter nearer than the spherical Gaussian exp(−6x).
+`weighted_rms` is what the fit minimizes: under the weight that of Schlick's term is {schlick:.2g}
+times that of the fit, that of the spherical Gaussian exp(−6x) {gaussian:.2g} times.
 `mdfconv fresnel --ior 1.5 --mu 1 --sigma 0.5` fits another medium or another range."""
-_RANGES = """\
-## Error by range of l·H, at IOR 1.4: maximum (root mean square)
 
-From l·H = 0.4 up the term is the best of the four. Below 0.2 it stops at 2^a = 0.3 and misses the
-rise to 1, as the article says: such angles are rare under direct light, and common under
-environment maps. There exp(−6x), which the article sets aside, is the one to take: at this index it
-stays within 0.006 of the exact curve everywhere."""
+
+def _range_prose(fitted: FresnelFit) -> str:
+    gaussian, _ = fitted.errors(fitted.curves()["exp(-6x)"], EDGES[0], EDGES[-1])
+    return f"""\
+## Error by range of l·H, at IOR {fitted.ior:g}: maximum (root mean square)
+
+From l·H = 0.4 up the term is the best of the four. Below 0.2 it stops at 2^a =
+{2**fitted.a:.1f} and misses the rise to 1, as the article says: such angles are rare under direct
+light, and common under environment maps. There exp(−6x), which the article sets aside, is the one
+to take: at this index it stays within {gaussian:.1g} of the exact curve everywhere."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from mdfconv.reports.figures import PAGE, encoded, pyplot
+from mdfconv.output.figures import PAGE, encoded, pyplot
 
 Curves = Mapping[str, Sequence[float]]
 

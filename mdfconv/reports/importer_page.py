@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
+from mdfconv.conversion.endpoint import endpoints
 from mdfconv.distributions.evaluation import Array
-from mdfconv.fitting.metrics import metric
-from mdfconv.reports.figures import PAGE, encoded, pyplot
-from mdfconv.reports.text import csv_text, file_bytes, markdown_text, rounded_rows
-from mdfconv.scene.shininess import IMPORTER_RULES, error_of, importer_roughness, roughness_of
+from mdfconv.fitting.metrics import metric_named
+from mdfconv.formula import Problem, cheapest
+from mdfconv.output.figures import PAGE, encoded, pyplot
+from mdfconv.output.files import file_bytes
+from mdfconv.output.records import csv_text, markdown_text, rounded_rows
+from mdfconv.reports.artefact import Artefact
+from mdfconv.scene.shininess import (
+    IMPORTER_RULES,
+    ROUGHNESS,
+    SHININESS,
+    error_of,
+    importer_roughness,
+    roughness_of,
+)
 
 _EXPONENTS = np.geomspace(1, 1e4, 81)
 _SHOWN = np.array([1.0, 3, 10, 30, 100, 300, 1000, 3000, 10000])
-_OURS = "energy", "display"
+_LIGHT = "energy"
+_OURS = _LIGHT, "display"
 _STYLES = {
     "1 - Ns/1000": ("#0072B2", "-."),
     "1 - sqrt(Ns/1000)": ("#E69F00", (0, (4, 2))),
@@ -24,29 +37,62 @@ _STYLES = {
 }
 
 
-def importer_page() -> tuple[dict[str, bytes], str]:
-    """Return the files of the page by name, and its result in a line."""
+def importer_page() -> Artefact:
+    """Return what importers make of a Wavefront exponent, beside the best fit."""
     curves = _columns(_EXPONENTS)
     rows = [_shown(row) for row in rounded_rows(_columns(_SHOWN))]
+    prose = _PROSE.format(**_answer(), **_failures(curves))
     files = {
         "importers.csv": file_bytes(csv_text(list(curves), rounded_rows(curves))),
-        "importers.md": file_bytes(f"{_PROSE}\n\n{markdown_text(list(rows[0]), rows)}"),
+        "importers.md": file_bytes(f"{prose}\n\n{markdown_text(list(rows[0]), rows)}"),
         "importers.png": _draw(curves),
     }
-    at = int(np.flatnonzero(_SHOWN == 100)[0])
-    given = [f"{rows[at][name]:g}" for name in (*IMPORTER_RULES, "energy")]
-    summary = f"at Ns = 100 the rules give roughness {', '.join(given[:3])}; the light asks for "
-    return files, summary + given[3]
+    at_100 = rows[int(np.flatnonzero(_SHOWN == 100)[0])]
+    by_rule = ", ".join(f"{at_100[rule]:g}" for rule in IMPORTER_RULES)
+    summary = f"at Ns = 100 the rules give roughness {by_rule}; the light asks for "
+    return Artefact(
+        files,
+        "what becomes of Ns in a renderer with roughness",
+        f"{summary}{at_100[_LIGHT]:g}",
+        "mdfconv mtl --compare",
+    )
 
 
 def _columns(exponents: Array) -> dict[str, Array]:
     """Return Ns, the roughness by each rule and by ours, and the RMSE of each for the light."""
-    found = {"Ns": exponents}
-    found |= {rule: importer_roughness(rule, exponents) for rule in IMPORTER_RULES}
-    found |= {name: roughness_of(exponents, metric(name)) for name in _OURS}
-    names = [name for name in found if name not in ("Ns", "display")]
-    measure = metric("energy")
-    return found | {f"RMSE {name}": error_of(exponents, found[name], measure) for name in names}
+    roughness = {rule: importer_roughness(rule, exponents) for rule in IMPORTER_RULES}
+    roughness |= {name: roughness_of(exponents, metric_named(name)) for name in _OURS}
+    light = metric_named(_LIGHT)
+    errors = {
+        f"RMSE {name}": error_of(exponents, roughness[name], light)
+        for name in (*IMPORTER_RULES, _LIGHT)
+    }
+    return {"Ns": exponents} | roughness | errors
+
+
+def _answer() -> dict[str, str]:
+    """Return the short formula for the light's answer, and its error, for the prose."""
+    low, high = float(_EXPONENTS[0]), float(_EXPONENTS[-1])
+    problem = Problem(*endpoints(SHININESS, ROUGHNESS), metric_named(_LIGHT), low, high)
+    formula = cheapest(problem, 0.01)
+    constant, slope = formula.numerator
+    return {
+        "formula": f"({slope:.3g} Ns + {constant:.3g})^(−{Fraction(-formula.shape.outer)})",
+        "formula_error": f"{100 * formula.error:.1g} %",
+        "range": f"{low:g} to {high:g}",
+    }
+
+
+def _failures(curves: dict[str, Array]) -> dict[str, str]:
+    """Return how far too rough the rules get, and from which Ns on they are too smooth or 0."""
+    ratios = [curves[rule] / curves[_LIGHT] for rule in IMPORTER_RULES]
+    numbers = {
+        "times": [f"{ratio.max():.1f}" for ratio in ratios],
+        "smooth": [f"{curves['Ns'][np.argmax(ratio < 1)]:.0f}" for ratio in ratios],
+        # 1 − 1000/1000 is rounded.
+        "mirror": [f"{curves['Ns'][np.argmax(ratio < 1e-9)]:.0f}" for ratio in ratios],
+    }
+    return {name: f"{', '.join(texts[:-1])} and {texts[-1]}" for name, texts in numbers.items()}
 
 
 def _shown(row: dict[str, float]) -> dict[str, Any]:
@@ -66,8 +112,8 @@ def _draw(curves: dict[str, Array]) -> bytes:
         left.plot(curves["Ns"], curves[name], label=label, **style)
         if f"RMSE {name}" in curves:
             errors = curves[f"RMSE {name}"]
-            there = np.isfinite(errors)
-            right.plot(curves["Ns"][there], errors[there], **style)
+            finite = np.isfinite(errors)
+            right.plot(curves["Ns"][finite], errors[finite], **style)
     left.set(xscale="log", xlabel="Ns", ylabel="roughness Pr", title="What becomes of an exponent")
     right.set(
         xscale="log",
@@ -91,8 +137,8 @@ that of Blinn/Phong (`mdfconv mtl`), `display` the one whose picture on a screen
 normalized distributions, relative to Blinn/Phong's peak, on β from 0 to 4.8 β_half; `mirror` is a
 roughness of 0, which has no highlight to compare.
 
-The answer is a power: Pr ≈ (0.589 Ns + 1.11)^(−1/4) is right within 0.2 % from Ns 1 to 10000
-(`mdfconv formula --from blinn-phong --to ggx:roughness --metric energy`). The rules end at Ns = 100
-or 1000, from where on they make a perfect mirror of everything; before, they are far too rough, but
-for the third between Ns = 10 and 40, where it crosses the answer. What is left of the error of
-`energy` is the difference between the two distributions, which no roughness mends."""
+The answer is a power: Pr ≈ {formula} is right within {formula_error} from Ns {range}
+(`mdfconv formula --from blinn-phong --to ggx:roughness --metric energy`). The rules are too rough,
+by up to {times} times, then too smooth, from Ns = {smooth} on, and end at
+Ns = {mirror}, from where on they make a perfect mirror of everything. What remains of
+the error of `energy` is the difference between the two distributions, which no roughness mends."""

@@ -2,122 +2,177 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from itertools import permutations
+from textwrap import fill
 from typing import Any
 
 import numpy as np
 
-from mdfconv.benchmark.methods import answers, covering
-from mdfconv.conversion import find_method
-from mdfconv.conversion.residual import residual
-from mdfconv.distributions import Distribution, distribution
+from mdfconv.benchmark.methods import answers, as_wide, covering
+from mdfconv.conversion.equivalence import exact_route
+from mdfconv.conversion.method import Method
+from mdfconv.conversion.remaining_error import remaining_error
+from mdfconv.distributions import Distribution, one_parameter_distributions
 from mdfconv.distributions.evaluation import Array
-from mdfconv.fitting.metrics import Metric, list_metrics
-from mdfconv.fitting.metrics import metric as find_metric
-from mdfconv.reports.text import csv_text, file_bytes, markdown_text
+from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
+from mdfconv.output.files import file_bytes
+from mdfconv.output.records import csv_text, markdown_text
+from mdfconv.reports.artefact import Artefact
 
-_NAMES = ("beckmann", "gauss", "ggx", "blinn-phong", "sawicki", "schlick", "smoothie")
 # Beckmann's m_B for lobes of the same half width.
-_RANGES = {
-    "paper's sweep, m_B 0.0045-0.447": (0.0045, 0.01, 0.03, 0.1, 0.2, 0.3, 0.447),
-    "rougher, m_B 0.55-1": (0.55, 0.7, 0.85, 1.0),
-}
-_REFERENCE = "fast"
+_SWEEP, _ROUGHER = "paper's sweep, m_B 0.0045-0.447", "rougher, m_B 0.55-1"
+_RANGES = {_SWEEP: (0.0045, 0.01, 0.03, 0.1, 0.2, 0.3, 0.447), _ROUGHER: (0.55, 0.7, 0.85, 1.0)}
+# The stored maps are the fit within 1e-6 and answer at once; where there are none, the fit.
+_REFERENCES = ("fast", "fit")
+
+_Pair = tuple[Distribution, Distribution]
+# By range, metric and method: for each pair |p/p_fit − 1| and RMSE − RMSE_fit of each lobe, NaN
+# for no answer, shape (2, n).
+_Errors = dict[tuple[str, str, str], dict[_Pair, Array]]
 
 
-def method_page() -> tuple[dict[str, bytes], str]:
-    """Return the files of the page by name, and its result in a line."""
-    rows = [
-        _row(method, metric, where, errors)
-        for where, m_b in _RANGES.items()
-        for metric in map(find_metric, list_metrics())
-        for method, errors in _errors(np.array(m_b), metric).items()
-    ]
+def method_page() -> Artefact:
+    """Return the methods beside the best fit: the figures for the choice of a default."""
+    compared = [one for one in one_parameter_distributions() if one.map_variables is not None]
+    pairs = list(permutations(compared, 2))
+    equal = [pair for pair in pairs if exact_route(*pair) is not None]
+    errors = _compare([pair for pair in pairs if pair not in equal])
+    rows = {key: _row(key, list(group.values())) for key, group in errors.items()}
+    table, columns = list(rows.values()), list(next(iter(rows.values())))
+    prose = _prose(rows, _worst_closed_forms(errors), len(compared), [one.name for one, _ in equal])
     files = {
-        "methods.csv": file_bytes(csv_text(list(rows[0]), rows)),
-        "methods.md": file_bytes(f"{_PROSE}\n\n{markdown_text(list(rows[0]), rows)}"),
+        "methods.csv": file_bytes(csv_text(columns, table)),
+        "methods.md": file_bytes(f"{prose}\n\n{markdown_text(columns, table)}"),
     }
-    closed = {row["metric"]: row for row in rows[::-1] if row["method"] == "closed-form"}
-    medians = [f"{100 * closed[name]['median']:.2g} % ({name})" for name in list_metrics()]
-    return files, f"closed-form on the paper's sweep: median error {', '.join(medians)}"
+    medians = [
+        f"{_percent(rows[_SWEEP, name, 'closed-form']['median'])} ({name})"
+        for name in list_metrics()
+    ]
+    return Artefact(
+        files,
+        "which method should be the default",
+        f"closed-form on the paper's sweep: median error {', '.join(medians)}",
+        "mdfconv report",
+    )
 
 
-def _errors(m_b: Array, metric: Metric) -> dict[str, list[tuple[Array, Array]]]:
-    """Return for each method |p/p_fit − 1| and RMSE − RMSE_fit of each pair; NaN for no answer."""
-    tangents = distribution("beckmann").half_tangent(m_b)
-    found: dict[str, list[tuple[Array, Array]]] = {}
-    pairs = permutations(map(distribution, _NAMES), 2)
-    for source, target in (pair for pair in pairs if not find_method(_REFERENCE).is_exact(*pair)):
-        given = source.from_half_tangent(tangents)
-        given = given[~np.isnan(given)]
-        for name, result in _answers(given, source, target, metric):
-            found.setdefault(name, []).append(_compared(given, source, target, metric, result))
-    return found
+def _compare(pairs: Sequence[_Pair]) -> _Errors:
+    errors: _Errors = {}
+    for widths, m_b in _RANGES.items():
+        for metric in map(metric_named, list_metrics()):
+            for pair in pairs:
+                parameter = as_wide(m_b, pair[0])
+                parameter = parameter[~np.isnan(parameter)]
+                methods = {method.name: method for method in covering(*pair, metric)}
+                reference = next(methods[name] for name in _REFERENCES if name in methods)
+                best = _results_and_rmse(reference, parameter, pair, metric)
+                for name, method in methods.items():
+                    if not method.follows_metric:
+                        ours = _results_and_rmse(method, parameter, pair, metric)
+                        off = np.stack([np.abs(ours[0] / best[0] - 1), ours[1] - best[1]])
+                        errors.setdefault((widths, metric.name, name), {})[pair] = off
+    return errors
 
 
-def _answers(
-    given: Array, source: Distribution, target: Distribution, metric: Metric
-) -> Iterator[tuple[str, Array]]:
-    for method in covering(source, target, metric):
-        # The fit is its own reference, and the stored polynomials are within 1e-4 of it.
-        if method.name not in (_REFERENCE, "fit"):
-            yield method.name, answers(method, given, source, target, metric)
+def _results_and_rmse(method: Method, parameter: Array, pair: _Pair, metric: Metric) -> Array:
+    """Return the results of a method and the RMSE that they leave, shape (2, n)."""
+    source, target = pair
+    result = answers(method, parameter, source, target, metric)
+    answered = ~np.isnan(result)
+    rmse = np.full_like(result, np.nan)
+    rmse[answered], _ = remaining_error(
+        source, parameter[answered], target, result[answered], metric
+    )
+    return np.stack([result, rmse])
 
 
-def _compared(
-    given: Array, source: Distribution, target: Distribution, metric: Metric, result: Array
-) -> tuple[Array, Array]:
-    best = answers(find_method(_REFERENCE), given, source, target, metric)
-    left = np.full((2, given.size), np.nan)
-    for row, parameter in zip(left, (result, best), strict=True):
-        there = ~np.isnan(parameter)
-        row[there] = residual(source, given[there], target, parameter[there], metric)[0]
-    return np.abs(result / best - 1), left[0] - left[1]
-
-
-def _row(
-    method: str, metric: Metric, where: str, errors: list[tuple[Array, Array]]
-) -> dict[str, Any]:
-    off, worse = (np.concatenate(column) for column in zip(*errors, strict=True))
-    answered = float(np.mean(~np.isnan(off)))
-    return {
-        "range": where,
-        "metric": metric.name,
-        "method": method,
-        "pairs": len(errors),
-        "answered": _rounded(answered),
-        "median": _rounded(np.nanmedian(off)),
-        "worst": _rounded(np.nanmax(off)),
-        "excess_rmse_median": _rounded(np.nanmedian(worse)),
-        "excess_rmse_worst": _rounded(np.nanmax(worse)),
+def _row(key: tuple[str, str, str], group: Sequence[Array]) -> dict[str, Any]:
+    off, excess = np.concatenate(group, axis=1)
+    figures = {
+        "answered": np.mean(~np.isnan(off)),
+        "median": np.nanmedian(off),
+        "worst": np.nanmax(off),
+        "excess_rmse_median": np.nanmedian(excess),
+        "excess_rmse_worst": np.nanmax(excess),
     }
+    names = dict(zip(("range", "metric", "method"), key, strict=True))
+    rounded = {name: float(f"{value:.3g}") for name, value in figures.items()}
+    return names | {"pairs": len(group)} | rounded
 
 
-def _rounded(value: Any) -> float:
-    return float(f"{float(value):.3g}")
+def _worst_closed_forms(errors: _Errors) -> list[float]:
+    """Return the worst of those with a borrowed parameter, and the worst of the others."""
+    worst = [0.0, 0.0]
+    for pair, (off, _) in errors[_SWEEP, "unit", "closed-form"].items():
+        own = all(end.equivalent is None or end.equivalent.same_lobe for end in pair)
+        worst[own] = max(worst[own], float(np.nanmax(off)))
+    return worst
 
 
+def _percent(share: float) -> str:
+    """Return a share in two digits; no line breaks before its sign."""
+    return f"{float(f'{100 * share:.2g}'):g}\N{NO-BREAK SPACE}%"
+
+
+def _prose(
+    rows: dict[tuple[str, str, str], dict[str, Any]],
+    worst: Sequence[float],
+    count: int,
+    left_out: Sequence[str],
+) -> str:
+    def nearest(metric: str) -> dict[str, Any]:
+        chosen = [row for key, row in rows.items() if key[:2] == (_SWEEP, metric)]
+        return min(chosen, key=lambda row: row["median"])
+
+    light, picture = nearest("energy"), nearest("display")
+    missing = [1 - row["answered"] for row in rows.values() if row["range"] == _ROUGHER]
+    text = _PROSE.format(
+        count=count,
+        left_out=" and ".join(dict.fromkeys(left_out)),
+        shape=_percent(rows[_SWEEP, "unit", "closed-form"]["median"]),
+        borrowed=_percent(worst[False]),
+        own=_percent(worst[True]),
+        half_angle=_percent(rows[_SWEEP, "unit", "half-angle"]["median"]),
+        light=_percent(rows[_SWEEP, "energy", "closed-form"]["median"]),
+        light_method=light["method"],
+        light_median=_percent(light["median"]),
+        light_rmse=f"{light['excess_rmse_worst']:.2g}",
+        picture_method=picture["method"],
+        picture_median=_percent(picture["median"]),
+        missing=f"{_percent(min(missing))} to {_percent(max(missing))}",
+    )
+    return "\n".join(
+        fill(line, 100, subsequent_indent="  " * line.startswith("- "), break_on_hyphens=False)
+        for line in text.splitlines()
+    )
+
+
+# A paragraph, or an item of the list, in a line.
 _PROSE = """\
 # Which method should be the default
 
-Every method on every ordered pair of the seven one-parameter distributions (ggx and smoothie, which
-are one, left out), for lobes as wide as Beckmann's at the m_B given, against the best fit under
-each metric. `answered`: the share of the lobes. `median` and `worst`: |p/p_fit − 1| of the
-parameter. `excess_rmse`: the RMSE under the metric, relative to the source's peak, beyond that of
-the best fit. `fit` and `fast` have 0 in every column: `fast` is within 1e-6 of `fit` (1e-4 for the
-picture) at tens of millions of values a second (`mdfconv bench`).
+Every method on every ordered pair of {count} one-parameter distributions ({left_out}, which are \
+one, left out), for lobes as wide as Beckmann's at the m_B given, against the best fit under each \
+metric. `answered`: the share of the lobes. `median` and `worst`: |p/p_fit − 1| of the parameter. \
+`excess_rmse`: the RMSE under the metric, relative to the source's peak, beyond that of the best \
+fit. `fit` and `fast` have 0 in every column: `fast` is within 1e-6 of `fit` (1e-4 for the \
+picture) at the price of a formula (`mdfconv bench`).
 
 For choosing:
 
-- Inside the paper's sweep the closed forms keep the *shape*: half of the lobes within 1 % of the
-  best parameter. The worst are Schlick's, whose m_B the paper takes from Beckmann's; the others
-  are within 10 %. There `closed-form` is a fair default, and `half-angle` is not.
-- For the *light* the closed forms are wrong by 17 % in the median. Of the formulas `peak` comes
-  nearest: 8 % in the median, with an RMSE that is at most 0.004 above that of the best fit.
-- For the *picture* no formula comes near.
-- Rougher than the sweep, no formula is good for anything, and each fails for one lobe in ten.
+- Inside the paper's sweep the closed forms keep the *shape*: half of the lobes within {shape} of \
+the best parameter. The worst are Schlick's, whose m_B the paper takes from Beckmann's, up to \
+{borrowed} off; the others are within {own}. There `closed-form` is a fair default, and \
+`half-angle`, {half_angle} off in the median, is not.
+- For the *light* the closed forms are wrong by {light} in the median. Of the formulas \
+`{light_method}` comes nearest: {light_median} in the median, with an RMSE that is at most \
+{light_rmse} above that of the best fit.
+- For the *picture* no formula comes near: the nearest, `{picture_method}`, is {picture_median} \
+off in the median.
+- Rougher than the sweep, no formula is good for anything, and each has no answer for {missing} \
+of the lobes.
 
-A renderer with normalized distributions is served better by `fast --metric energy` than by the
-default. The default stays the paper's closed form: it is what is printed, and what is to be kept
+A renderer with normalized distributions is served better by `fast --metric energy` than by the \
+default. The default stays the paper's closed form: it is what is printed, and what is to be kept \
 is for the user to say."""

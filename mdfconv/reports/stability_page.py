@@ -4,28 +4,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from textwrap import fill
 
 from mdfconv.benchmark.stability import audit
 from mdfconv.benchmark.stability_finding import Finding
-from mdfconv.distributions import list_distributions
-from mdfconv.reports.text import csv_text, file_bytes, markdown_text
+from mdfconv.output.files import file_bytes
+from mdfconv.output.records import csv_text, markdown_text
+from mdfconv.reports.artefact import Artefact
 
 _COLUMNS = ("distribution", "rule", "regime", "dtype", "cases", "out_of_range", "error", "textbook")
 _KERNELS = ("unit", "normalized")
+_NO_DIGIT, _FAILS = "1", "fails"
 
 Row = dict[str, object]
 
 
-def stability_page() -> tuple[dict[str, bytes], str]:
-    """Return the files of the page by name, and its result in a line.
+def stability_page() -> Artefact:
+    """Return the audit of hard cases.
 
     Errors are orders of magnitude, rounded up: their digits differ from one processor to the
     next.
     """
     findings = list(audit())
-    kernels = [found for found in findings if found.rule in _KERNELS]
-    others = [found for found in findings if found.rule not in _KERNELS]
-    rows = [_row(found) for found in findings]
+    kernels = [finding for finding in findings if finding.rule in _KERNELS]
+    others = [finding for finding in findings if finding.rule not in _KERNELS]
+    rows = [_row(finding) for finding in findings]
     kernel_table = _beside(kernels, ("distribution", "rule", "regime"))
     conversion_table = _beside(others, ("rule", "regime"))
     page = "\n".join(
@@ -34,13 +37,13 @@ def stability_page() -> tuple[dict[str, bytes], str]:
             "",
             "## Kernels",
             "",
-            _KERNEL_PROSE,
+            _kernel_prose(kernels),
             "",
             markdown_text(list(kernel_table[0]), kernel_table),
             "",
             "## Conversions",
             "",
-            _CONVERSION_PROSE,
+            _conversion_prose(others),
             "",
             markdown_text(list(conversion_table[0]), conversion_table),
         ]
@@ -49,14 +52,16 @@ def stability_page() -> tuple[dict[str, bytes], str]:
         "stability.csv": file_bytes(csv_text(_COLUMNS, rows)),
         "stability.md": file_bytes(page),
     }
-    failures = sum(not math.isfinite(found.error) for found in findings)
-    spoiled = sum(isinstance(found.textbook, str) and bool(found.textbook) for found in findings)
-    cases = sum(found.cases for found in findings)
-    summary = (
-        f"{failures} failures in {cases} cases of {len(list_distributions())} distributions; "
+    failures = sum(_magnitude(finding.error) == _FAILS for finding in findings)
+    spoiled = sum(_magnitude(finding.textbook) == _FAILS for finding in findings)
+    cases = sum(finding.cases for finding in findings)
+    audited = {finding.distribution for finding in findings}
+    agreement = (
+        f"{failures} failures in {cases} cases of {len(audited)} distributions; "
         f"the printed expressions fail in {spoiled} of {len(findings)} groups"
     )
-    return files, summary
+    question = "how accurate the forms are where formulas lose their digits"
+    return Artefact(files, question, agreement, "mdfconv stability")
 
 
 _INTRODUCTION = """\
@@ -71,31 +76,58 @@ with the number of cases and of exact values that the type holds as 0, a subnorm
 infinity only (`out_of_range`); all of them come out so. `mdfconv stability` prints more digits,
 and where the worst is."""
 
-_KERNEL_PROSE = """\
-Roughness is 0.01 or more in `usual` (N up to 20000) and 0.001 down to 1e-8 in `mirror-smooth` (N
-up to 1e16). GGX, GTR, Schlick, Sawicki and Blinn/Phong as printed lose their digits as a surface
-becomes smoother: in float32 three are left at a roughness of 0.01 and none at 0.0001, in float64
-none at 1e-8, and in float16 they are of no use. The forms used here keep them in every type.
-Beckmann, Gauss and Smoothie as printed are as good in float64 and float32; only float16, in which
-m² already underflows, spoils them. `tail` is D̄ below 1e-6, where an exponential multiplies the
-rounding of its exponent, whoever computes it. `edge of support` is the end of Schlick's lobe, both
-sides of it. The normalized forms are compared at β = 0; elsewhere they are multiples of the unit
-forms. The printed constant of the Gaussian is an approximation (2.7 % off at m_G = 0.4) without a
-value above m_G = 1.89; that of GTR is 0/0 at γ = 1 and at C_TR = 1."""
 
-_CONVERSION_PROSE = """\
-The worst over all sources. For a smooth surface cos β_half rounds to 1, and the printed half-angle
-formulas have nothing left to convert. `and back` is a round trip: where a target has nearly reached
-its widest lobe a stored number does not determine where it came from, which no formula can mend
-(Blinn/Phong N = 0.1 by half-angle through GGX, Smoothie α_s = 100 through GGX). Glossiness stores a
-mirror-smooth surface next to 1, which costs four digits at α = 1e-8; roughness costs none. `fit`
-and `fast` are compared with best fits to 24 digits."""
+def _kernel_prose(findings: Sequence[Finding]) -> str:
+    smooth = {
+        finding.distribution: _magnitude(finding.textbook)
+        for finding in findings
+        if (finding.rule, finding.regime, finding.dtype) == ("unit", "mirror-smooth", "float64")
+    }
+    losing = [name for name, error in smooth.items() if error in (_NO_DIGIT, _FAILS)]
+    sound = [name for name in smooth if name not in losing]
+    return fill(
+        "Roughness is 0.01 or more in `usual` (N up to 20000) and 0.001 down to 1e-8 in "
+        f"`mirror-smooth` (N up to 1e16). {_and(losing)} as printed lose their digits as a surface "
+        "becomes smoother, the last of them in `mirror-smooth`, even in float64. The forms used "
+        f"here keep them in every type. {_and(sound)} as printed are as good in float64 and "
+        "float32; only float16, in which the square of a roughness already underflows, spoils "
+        "them. `tail` is D̄ below 1e-6, where an exponential multiplies the rounding of its "
+        "exponent, whoever computes it. `edge of support` is the end of Schlick's lobe, both sides "
+        "of it. The normalized forms are compared at β = 0; elsewhere they are multiples of the "
+        "unit forms. The printed constant of the Gaussian is an approximation, without a value for "
+        "a very rough surface; that of GTR is 0/0 at γ = 1 and at C_TR = 1.",
+        100,
+        break_on_hyphens=False,
+    )
 
 
-def _row(found: Finding) -> Row:
-    return {name: getattr(found, name) for name in _COLUMNS[:-2]} | {
-        "error": _magnitude(found.error),
-        "textbook": _magnitude(found.textbook),
+def _conversion_prose(findings: Sequence[Finding]) -> str:
+    trips = [
+        finding
+        for finding in findings
+        if finding.rule.endswith(" and back") and finding.regime == "rough"
+    ]
+    hardest = max(trips, key=lambda trip: float(trip.error or 0))
+    return fill(
+        "The worst over all sources. For a smooth surface cos β_half rounds to 1, and the printed "
+        "half-angle formulas have nothing left to convert. `and back` is a round trip: where a "
+        "target has nearly reached its widest lobe a stored number does not determine where it "
+        f"came from, which no formula can mend (the hardest: {hardest.worst} by {hardest.rule} in "
+        f"{hardest.dtype}). Glossiness stores a mirror-smooth surface next to 1, which costs "
+        "digits; roughness costs none. `fit` and `fast` are compared with best fits to 24 digits.",
+        100,
+        break_on_hyphens=False,
+    )
+
+
+def _and(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1])] * (len(names) > 1) + list(names[-1:]))
+
+
+def _row(finding: Finding) -> Row:
+    return {name: getattr(finding, name) for name in _COLUMNS[:-2]} | {
+        "error": _magnitude(finding.error),
+        "textbook": _magnitude(finding.textbook),
     }
 
 
@@ -105,18 +137,18 @@ def _beside(findings: Iterable[Finding], keys: tuple[str, ...]) -> list[Row]:
     A cell is empty where there is nothing to compare.
     """
     groups: dict[tuple[object, ...], list[Finding]] = {}
-    for found in findings:
-        groups.setdefault(tuple(getattr(found, key) for key in keys), []).append(found)
-    types = list(dict.fromkeys(found.dtype for group in groups.values() for found in group))
+    for finding in findings:
+        groups.setdefault(tuple(getattr(finding, key) for key in keys), []).append(finding)
+    types = list(dict.fromkeys(finding.dtype for group in groups.values() for finding in group))
     rows = []
     for values, group in groups.items():
         row: Row = dict(zip(keys, values, strict=True))
         for name in types:
-            chosen = [found for found in group if found.dtype == name]
-            comparable = any(found.cases > found.out_of_range for found in chosen)
+            chosen = [finding for finding in group if finding.dtype == name]
+            comparable = any(finding.cases > finding.out_of_range for finding in chosen)
             for column, errors in (
-                (name, [found.error for found in chosen]),
-                (f"{name} textbook", [found.textbook for found in chosen]),
+                (name, [finding.error for finding in chosen]),
+                (f"{name} textbook", [finding.textbook for finding in chosen]),
             ):
                 largest = _largest(errors)
                 row[column] = largest if comparable or largest != "0" else ""
@@ -126,8 +158,8 @@ def _beside(findings: Iterable[Finding], keys: tuple[str, ...]) -> list[Row]:
 
 def _largest(errors: Sequence[float | str]) -> str:
     texts = [_magnitude(error) for error in errors]
-    if "fails" in texts:
-        return "fails"
+    if _FAILS in texts:
+        return _FAILS
     return max((text for text in texts if text), key=float, default="")
 
 
@@ -136,8 +168,8 @@ def _magnitude(error: float | str) -> str:
     if error == "":
         return ""
     if isinstance(error, str) or not math.isfinite(error):
-        return "fails"
+        return _FAILS
     if error == 0:
         return "0"
     power = math.ceil(math.log10(error))
-    return "1" if power >= 0 else f"1e{power:03d}"
+    return _NO_DIGIT if power >= 0 else f"1e{power:03d}"

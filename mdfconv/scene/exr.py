@@ -19,6 +19,7 @@ from mdfconv.scene.image_picture import (
     reading,
 )
 
+# Names of OpenEXR's compressions with losses.
 _LOSSY = ("B44", "B44A", "DWAA", "DWAB", "LJ2K", "PXR24")
 
 
@@ -64,18 +65,20 @@ def read_exr(path: Path, channel: str | None, max_pixels: int | None) -> Picture
     try:
         import OpenEXR
     except ImportError:
-        raise MdfconvError("an OpenEXR file needs: pip install 'mdfconv[exr]'") from None
+        raise MdfconvError(
+            "an OpenEXR file needs the library of that name", "pip install 'mdfconv[exr]'"
+        ) from None
     with reading(path), quiet_streams():
         head = OpenEXR.File(str(path), header_only=True)
         if len(head.parts) != 1:
-            raise MdfconvError(f"{path} has {len(head.parts)} parts; split it")
+            raise MdfconvError(f"{path} has {len(head.parts)} parts", "split it")
         header = head.parts[0].header
         if header.get("type") in (OpenEXR.deepscanline, OpenEXR.deeptile):
             raise MdfconvError(f"{path} holds deep texels, which are no texture")
         low, high = header["dataWindow"]
         width, height = (int(side) for side in high - low + 1)
         check_size(path, (width, height), max_pixels)
-        names = [entry.name for entry in header["channels"]]
+        names = [described.name for described in header["channels"]]
         name = names[find_channel(path, names, channel)]
         file = OpenEXR.File(str(path), separate_channels=True)
         # For a damaged file some releases raise, others return no part.

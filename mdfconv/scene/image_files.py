@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mdfconv.errors import MdfconvError
-from mdfconv.scene.image_picture import Form, Picture, reading
+from mdfconv.scene.image_picture import ACCEPT_LOSSES, Form, Picture, reading
 
 _SIGNATURES = {
     b"\x89PNG\r\n\x1a\n": Form.png,
@@ -42,27 +42,31 @@ def check_files(source: Path, output: Path, *, lossy: bool = False) -> tuple[For
         If the source is not what its name says or no texture, if the output's name is of a form
         that cannot hold it, or if both are the same file.
     """
-    given = _form_of(source)
-    wanted = _ENDINGS.get(output.suffix.lower())
-    if given is Form.jpeg and not lossy:
+    source_form = _form_of(source)
+    output_form = _ENDINGS.get(output.suffix.lower())
+    if source_form is Form.jpeg and not lossy:
         raise MdfconvError(
             f"{source} is a JPEG, which has altered the values (8-bit blocks with losses, made "
-            "for gamma-encoded pictures): take the original, or --lossy"
+            "for gamma-encoded pictures)",
+            ACCEPT_LOSSES,
+            argument="lossy",
         )
-    if wanted is Form.jpeg:
-        raise MdfconvError(f"{output}: a JPEG would alter the values; write .png or .tif")
-    if wanted is None:
+    if output_form is Form.jpeg:
+        raise MdfconvError(f"{output}: a JPEG would alter the values", "write .png or .tif")
+    if output_form is None:
         raise MdfconvError(f"{output} does not end in .png, .tif, .tiff or .exr")
-    if (given is Form.exr) != (wanted is Form.exr):
-        endings = ".exr" if given is Form.exr else ".png or .tif"
-        kind = "floats" if given is Form.exr else "integers"
-        raise MdfconvError(f"{source} holds {kind}, which {wanted} does not: write {endings}")
-    check_place(output, source)
-    return given, wanted
+    if (source_form is Form.exr) != (output_form is Form.exr):
+        endings = ".exr" if source_form is Form.exr else ".png or .tif"
+        kind = "floats" if source_form is Form.exr else "integers"
+        raise MdfconvError(
+            f"{source} holds {kind}, which {output_form} does not", f"write {endings}"
+        )
+    check_output(output, source)
+    return source_form, output_form
 
 
-def check_place(output: Path, *others: Path) -> None:
-    """Refuse, before any work, a place that is one of the other files or no file at all.
+def check_output(output: Path, *others: Path) -> None:
+    """Refuse, before any work, an output that is one of the other files or no file at all.
 
     Raises
     ------
@@ -71,7 +75,7 @@ def check_place(output: Path, *others: Path) -> None:
     """
     for other in others:
         if output == other or (output.exists() and other.exists() and output.samefile(other)):
-            raise MdfconvError(f"{output} is the same file as {other}: write to another one")
+            raise MdfconvError(f"{output} is the same file as {other}", "write to another one")
     if output.is_dir():
         raise MdfconvError(f"cannot write {output}: Is a directory")
 
@@ -80,13 +84,13 @@ def _form_of(source: Path) -> Form:
     """Return the form of a file's content, if its name does not say another."""
     with reading(source), source.open("rb") as file:
         start = file.read(8)
-    found = next((form for key, form in _SIGNATURES.items() if start.startswith(key)), None)
+    form = next((form for key, form in _SIGNATURES.items() if start.startswith(key)), None)
     named = _ENDINGS.get(source.suffix.lower())
-    if found is None:
+    if form is None:
         raise MdfconvError(f"{source} is no PNG, TIFF or OpenEXR file")
-    if named not in (None, found):
-        raise MdfconvError(f"{source} holds {found}, not what its name says")
-    return found
+    if named not in (None, form):
+        raise MdfconvError(f"{source} holds {form}, not what its name says")
+    return form
 
 
 def open_picture(
@@ -123,12 +127,12 @@ def blank(picture: Picture, dtype: np.dtype[Any]) -> Picture:
 
 @contextmanager
 def staged(output: Path) -> Iterator[Path]:
-    """Give a file beside the output's place, and rename it when all went well.
+    """Give a file beside the output, and rename it to it when all went well.
 
     Raises
     ------
     MdfconvError
-        If it cannot be written; the place is then as it was.
+        If it cannot be written; the output is then as it was.
     """
     mask = os.umask(0)
     os.umask(mask)

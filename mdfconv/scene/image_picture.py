@@ -25,6 +25,8 @@ _DAMAGE = (
     *(ArithmeticError, AttributeError, struct.error, zlib.error),
 )
 _GREY = ("l", "y", "grey", "gray")
+# What helps where compression has altered the values.
+ACCEPT_LOSSES = "take the original, or accept the losses"
 
 
 class Form(StrEnum):
@@ -107,13 +109,15 @@ def find_channel(path: Path, names: Sequence[str], wanted: str | None) -> int:
     known = ", ".join(names)
     if wanted is None:
         if len(names) != 1:
-            raise MdfconvError(f"{path} has the channels {known}: choose one with --channel")
+            raise MdfconvError(
+                f"{path} has the channels {known}", "choose one channel", argument="channel"
+            )
         return 0
     if wanted in names:
         return names.index(wanted)
     keys = [_key(name) for name in names]
     if keys.count(_key(wanted)) != 1:
-        raise MdfconvError(f"{path} has no channel '{wanted}': its channels are {known}")
+        raise MdfconvError(f"{path} has no channel '{wanted}'", f"its channels are {known}")
     return keys.index(_key(wanted))
 
 
@@ -137,7 +141,9 @@ def check_size(path: Path, size: tuple[int, int], max_pixels: int | None) -> Non
     if limit is not None and pixels > limit:
         raise MdfconvError(
             f"{path} has {size[0]}×{size[1]} = {pixels} pixels, more than the {limit} that are "
-            f"safe to decode unasked: --max-pixels {pixels} converts it"
+            "safe to decode unasked",
+            f"allow {pixels} pixels",
+            argument="max_pixels",
         )
 
 
@@ -167,14 +173,14 @@ def quiet_streams() -> Iterator[None]:
     for stream in streams.values():
         if stream is not None:
             stream.flush()
-    kept = [(place, os.dup(place)) for place, stream in streams.items() if stream is not None]
+    kept = [(number, os.dup(number)) for number, stream in streams.items() if stream is not None]
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
-        for place, _ in kept:
-            os.dup2(nowhere, place)
+        for number, _ in kept:
+            os.dup2(nowhere, number)
         yield
     finally:
-        for place, copy in kept:
-            os.dup2(copy, place)
+        for number, copy in kept:
+            os.dup2(copy, number)
             os.close(copy)
         os.close(nowhere)

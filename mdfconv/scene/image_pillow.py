@@ -16,6 +16,7 @@ from PIL.TiffImagePlugin import TiffImageFile
 
 from mdfconv.errors import MdfconvError
 from mdfconv.scene.image_picture import (
+    ACCEPT_LOSSES,
     Attributes,
     Form,
     Picture,
@@ -37,9 +38,14 @@ _BANDS = {
     "I;16": "L",
     "I;16B": "L",
 }
+# Pillow's names of compressions with losses.
 _LOSSY = ("jpeg", "tiff_jpeg", "webp")
 # Of the PNG header: bits a sample, after the signature, the chunk's head and the size.
 _PNG_DEPTH = 24
+# Numbers of TIFF's tags, and of two of their values.
+_BITS_PER_SAMPLE, _PHOTOMETRIC, _SAMPLES_PER_PIXEL, _EXTRA_SAMPLES = 258, 262, 277, 338
+_WHITE_IS_ZERO, _ASSOCIATED_ALPHA = 0, 1
+# Deflate, of the differences between neighbours (tag 317).
 _COMPRESSION, _PREDICTOR = "tiff_adobe_deflate", {317: 2}
 
 
@@ -109,55 +115,59 @@ def decode(
         _check_kind(image, path, lossy=lossy)
         attributes = Attributes(image.info.get("icc_profile"), _dpi(image))
         bands = _BANDS[image.mode]
-        place = find_channel(path, bands.lower(), channel)
+        index = find_channel(path, bands.lower(), channel)
         if len(bands) > 1 and _depth(image, file) == 16:
             from mdfconv.scene.image_vips import read_deep
 
-            return read_deep(path, bands, place, attributes)
+            return read_deep(path, bands, index, attributes)
         with quiet_streams():
             image.load()
-    return PillowPicture(image, place, attributes)
+    return PillowPicture(image, index, attributes)
 
 
 def _check_kind(image: ImageFile, path: Path, *, lossy: bool) -> None:
     """Refuse pictures whose values are not those of a roughness, or would not be kept."""
-    reason = ""
+    reason, hint = "", ""
     if image.mode in ("P", "PA"):
-        reason = "has a palette: its texels are indices, not values; save it as grey or RGB"
+        reason = "has a palette: its texels are indices, not values"
+        hint = "save it as grey or RGB"
     elif image.mode not in _BANDS:
         reason = f"is of Pillow's mode {image.mode}, not grey or RGB(A) of 8 or 16 bits"
     elif getattr(image, "n_frames", 1) > 1:
-        reason = "holds several pictures, of which only one would be kept; split it"
+        reason, hint = "holds several pictures, of which only one would be kept", "split it"
     elif "transparency" in image.info:
-        reason = "makes one value transparent, which would be another; save it with alpha"
+        reason = "makes one value transparent, which would be another"
+        hint = "save it with alpha"
     elif isinstance(image, TiffImageFile):
-        reason = _tiff_reason(image, lossy=lossy)
+        reason, hint = _tiff_reason(image, lossy=lossy)
     if reason:
-        raise MdfconvError(f"{path} {reason}")
+        raise MdfconvError(f"{path} {reason}", hint)
 
 
-def _tiff_reason(image: TiffImageFile, *, lossy: bool) -> str:
+def _tiff_reason(image: TiffImageFile, *, lossy: bool) -> tuple[str, str]:
+    """Return why a TIFF cannot be taken, and what helps; empty if it can."""
     tags = image.tag_v2
-    if tags.get(277, 1) != len(image.getbands()):
-        return f"has {tags[277]} channels, of which only {image.mode} would be kept"
-    if 1 in tags.get(338, ()):
-        return "has channels that are multiplied by alpha; save it with unassociated alpha"
-    if tags.get(262) == 0 and image.mode.startswith("I;16"):
-        return "counts from white (0) to black; save it with black as zero"
+    if tags.get(_SAMPLES_PER_PIXEL, 1) != len(image.getbands()):
+        count = tags[_SAMPLES_PER_PIXEL]
+        return f"has {count} channels, of which only {image.mode} would be kept", ""
+    if _ASSOCIATED_ALPHA in tags.get(_EXTRA_SAMPLES, ()):
+        return "has channels that are multiplied by alpha", "save it with unassociated alpha"
+    if tags.get(_PHOTOMETRIC) == _WHITE_IS_ZERO and image.mode.startswith("I;16"):
+        return "counts from white (0) to black", "save it with black as zero"
     if image.info.get("compression") in _LOSSY and not lossy:
-        return "is compressed with losses, which has altered the values; --lossy takes it as it is"
-    return ""
+        return "is compressed with losses, which has altered the values", ACCEPT_LOSSES
+    return "", ""
 
 
 def _depth(image: ImageFile, file: IO[bytes]) -> int:
     """Return the bits a sample in the file, which Pillow cuts to 8 for several channels."""
     if isinstance(image, TiffImageFile):
-        return int(max(image.tag_v2.get(258, (1,))))
+        return int(max(image.tag_v2.get(_BITS_PER_SAMPLE, (1,))))
     if isinstance(image, PngImageFile):
-        place = file.tell()
+        position = file.tell()
         file.seek(_PNG_DEPTH)
         depth = file.read(1)[0]
-        file.seek(place)
+        file.seek(position)
         return depth
     return 8
 

@@ -70,7 +70,7 @@ def read_deep(path: Path, bands: str, channel: int, attributes: Attributes) -> P
                 str(path), access="sequential", fail_on="error", revalidate=True
             )
             if image.bands != len(bands):
-                raise MdfconvError(f"{path} is grey with alpha of 16 bits; save it as RGBA")
+                raise MdfconvError(f"{path} is grey with alpha of 16 bits", "save it as RGBA")
             samples = np.frombuffer(image.write_to_memory(), np.uint16)
         except vips.Error as error:
             raise OSError(_first_line(error)) from None
@@ -94,8 +94,8 @@ def _vips() -> Any:
         import pyvips
     except (ImportError, OSError):
         raise MdfconvError(
-            "16-bit RGB(A) needs libvips, as Pillow holds 8 bits of it: "
-            "pip install 'mdfconv[rgb16]'"
+            "16-bit RGB(A) needs libvips, as Pillow holds 8 bits of it",
+            "pip install 'mdfconv[rgb16]'",
         ) from None
     # Python writes to standard error what a library logs and nobody takes.
     logging.getLogger("pyvips").addHandler(logging.NullHandler())

@@ -8,11 +8,11 @@ from enum import StrEnum
 import numpy as np
 
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.metrics import metric as find_metric
+from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.mtl_statements import Line, lines, number, split_options
 from mdfconv.scene.shininess import error_of, exponent_of, roughness_of
 
+# Tools that write libraries end at 1000, some at 10000: more is likely of another scale.
 _LARGEST_USUAL = 1e4
 # Digits enough that an exponent comes back from a roughness to six.
 _DIGITS = {b"Pr": 8, b"Ns": 6}
@@ -36,7 +36,7 @@ class Material:
     line : int
         Line of the statement that was converted, counted from 1.
     shininess, roughness : float
-        Ns and Pr: the one given and the one found.
+        Ns and Pr: the one that was converted, and its conversion.
     rmse : float
         The error that the conversion leaves: root mean square under the metric, relative to the
         peak of Blinn/Phong.
@@ -121,7 +121,7 @@ def convert_mtl(
         best. ``"shininess"``: each with a Pr gets the Ns whose best GGX that is.
     metric : str or Metric
         What the fit keeps; readers of Pr use normalized distributions, so by default the
-        light. ``"display"`` is at exposure 1.
+        light.
     replace : bool
         Drop the statement that was converted.
     texture_names : dict, optional
@@ -143,14 +143,12 @@ def convert_mtl(
     keywords = (b"Ns", b"Pr") if to == To.roughness else (b"Pr", b"Ns")
     content = list(lines(data))
     blocks, problems = _blocks(content, keywords)
-    materials = _converted(blocks, to, find_metric(metric))
+    materials = _converted(blocks, to, metric_named(metric))
     texts = _edited(content, blocks, materials, keywords, replace=replace)
     textures = _textures(content, blocks, b"map_" + keywords[0])
     names = texture_names or {}
     _set_textures(texts, content, textures, b"map_" + keywords[1], names, replace=replace)
-    return MtlConversion(
-        b"".join(texts), tuple(entry for entry in materials if entry), textures, tuple(problems)
-    )
+    return MtlConversion(b"".join(texts), tuple(filter(None, materials)), textures, tuple(problems))
 
 
 def texture_statements(data: bytes) -> tuple[TextureStatement, ...]:
@@ -185,19 +183,21 @@ def _blocks(
 def _converted(blocks: list[_Block], to: str, metric: Metric) -> list[Material | None]:
     """Return the conversion of each material; None where there is nothing to convert."""
     values = np.array([np.nan if block.value is None else block.value for block in blocks])
-    found, rmse = np.full((2, values.size), np.nan)
-    given = ~np.isnan(values) & ((values > 0) | (to == To.roughness))
-    unique, place = np.unique(values[given], return_inverse=True)
+    results, rmse = np.full((2, values.size), np.nan)
+    # Pr 0 is a mirror, which has no exponent.
+    convertible = ~np.isnan(values) & ((values > 0) | (to == To.roughness))
+    # A library repeats its values.
+    unique, index = np.unique(values[convertible], return_inverse=True)
     if to == To.roughness:
-        answer = roughness_of(unique, metric)
-        left = error_of(unique, answer, metric)
+        answers = roughness_of(unique, metric)
+        errors = error_of(unique, answers, metric)
     else:
-        answer = exponent_of(unique, metric)
-        left = error_of(answer, unique, metric)
-    found[given], rmse[given] = answer[place], left[place]
+        answers = exponent_of(unique, metric)
+        errors = error_of(answers, unique, metric)
+    results[convertible], rmse[convertible] = answers[index], errors[index]
     return [
         None if np.isnan(value) else _material(block, to, float(value), float(result), float(error))
-        for block, value, result, error in zip(blocks, values, found, rmse, strict=True)
+        for block, value, result, error in zip(blocks, values, results, rmse, strict=True)
     ]
 
 

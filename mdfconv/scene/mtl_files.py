@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mdfconv.errors import MdfconvError
-from mdfconv.reports.text import write_files
+from mdfconv.output.files import write_files
 from mdfconv.scene.mtl import MtlConversion
 
 
 @dataclass(frozen=True)
-class Place:
+class Destination:
     """A library and where its conversion goes.
 
     Parameters
@@ -38,16 +38,18 @@ def find_libraries(patterns: Sequence[str]) -> list[Path]:
     MdfconvError
         If one stands for nothing.
     """
-    found: dict[Path, None] = {}
+    libraries: dict[Path, None] = {}
     for pattern in patterns:
         names = [pattern] if Path(pattern).exists() else sorted(glob.glob(pattern, recursive=True))
         if not names:
             raise MdfconvError(f"cannot read {pattern}: No such file or directory")
-        found |= dict.fromkeys(map(Path, names))
-    return list(found)
+        libraries |= dict.fromkeys(map(Path, names))
+    return list(libraries)
 
 
-def place_outputs(libraries: Sequence[Path], output: str | None, *, in_place: bool) -> list[Place]:
+def choose_outputs(
+    libraries: Sequence[Path], output: str | None, *, in_place: bool
+) -> list[Destination]:
     """Return where each library's conversion goes.
 
     Parameters
@@ -62,31 +64,45 @@ def place_outputs(libraries: Sequence[Path], output: str | None, *, in_place: bo
     Raises
     ------
     MdfconvError
-        If there is no place, more than one library for it, or a file that would be lost.
+        If the results are to go nowhere or to two places, several libraries to one file, or one
+        over a file that would be lost.
     """
     if in_place == (output is not None):
-        raise MdfconvError("give either -o OUTPUT or --in-place")
+        raise MdfconvError(
+            "a library is converted in place, or into another file or folder",
+            "choose one of them",
+            argument="in_place",
+        )
     if output is None:
-        real = [library.resolve() for library in libraries]
-        return [Place(library, library, _free_backup(library)) for library in dict.fromkeys(real)]
-    folder = Path(output)
-    if folder.is_dir():
-        places = [Place(library, folder / library.name) for library in libraries]
+        real = dict.fromkeys(library.resolve() for library in libraries)
+        return [Destination(library, library, _free_backup(library)) for library in real]
+    path = Path(output)
+    if path.is_dir():
+        destinations = [Destination(library, path / library.name) for library in libraries]
     elif len(libraries) > 1:
         raise MdfconvError(f"{len(libraries)} libraries need a folder: {output} is not one")
     elif output.endswith(("/", os.sep)) or output == "-":
         raise MdfconvError(f"cannot write {output}: it is not a file or an existing folder")
     else:
-        places = [Place(libraries[0], folder)]
-    outputs = [place.output for place in places]
-    for place in places:
-        if place.output.exists():
-            same = os.path.samefile(place.output, place.source)
-            hint = "it is the input: use --in-place" if same else "it exists"
-            raise MdfconvError(f"will not write {place.output}: {hint}")
-        if outputs.count(place.output) > 1:
-            raise MdfconvError(f"two libraries would both be written to {place.output}")
-    return places
+        destinations = [Destination(libraries[0], path)]
+    outputs = [destination.output for destination in destinations]
+    for destination in destinations:
+        _check_new(destination)
+        if outputs.count(destination.output) > 1:
+            raise MdfconvError(f"two libraries would both be written to {destination.output}")
+    return destinations
+
+
+def _check_new(destination: Destination) -> None:
+    """Refuse an output that exists."""
+    output = destination.output
+    if not output.exists():
+        return
+    if os.path.samefile(output, destination.source):
+        raise MdfconvError(
+            f"will not write {output}: it is the input", "convert it in place", argument="in_place"
+        )
+    raise MdfconvError(f"will not write {output}: it exists")
 
 
 def _free_backup(library: Path) -> Path:
@@ -112,35 +128,40 @@ def read_library(path: Path) -> bytes:
         raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
 
 
-def write_libraries(converted: Sequence[tuple[Place, bytes, MtlConversion]]) -> list[Place]:
+def write_libraries(
+    converted: Sequence[tuple[Destination, bytes, MtlConversion]],
+) -> list[Destination]:
     """Write all conversions, and backups first, or nothing.
 
     What a conversion in place does not change is not written.
 
     Parameters
     ----------
-    converted : sequence of (Place, bytes, MtlConversion)
-        For each library its place, its original and its conversion.
+    converted : sequence of (Destination, bytes, MtlConversion)
+        For each library where it goes, its original and its conversion.
 
     Returns
     -------
-    list of Place
+    list of Destination
         What was written.
 
     Raises
     ------
     MdfconvError
-        If a place cannot be written; nothing is then changed.
+        If a file cannot be written; nothing is then changed.
     """
     changed = [
-        (place, original, conversion.data)
-        for place, original, conversion in converted
-        if not (place.backup and conversion.data == original)
+        (destination, original, conversion.data)
+        for destination, original, conversion in converted
+        if not (destination.backup and conversion.data == original)
     ]
-    contents = {place.backup: original for place, original, _ in changed if place.backup}
-    contents |= {place.output: data for place, _, data in changed}
-    modes = {place.output: place.output.stat().st_mode for place, *_ in changed if place.backup}
-    write_files(contents)
+    contents: dict[Path, bytes] = {}
+    modes = {}
+    for destination, original, _ in changed:
+        if destination.backup:
+            contents[destination.backup] = original
+            modes[destination.output] = destination.output.stat().st_mode
+    write_files(contents | {destination.output: data for destination, _, data in changed})
     for path, mode in modes.items():
         path.chmod(mode)
-    return [place for place, *_ in changed]
+    return [destination for destination, *_ in changed]

@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.mtl import TextureStatement
+from mdfconv.scene.shininess import ROUGHNESS, SHININESS, method_for
 from mdfconv.scene.texture import convert_texture_file
 from mdfconv.scene.texture_rule import TextureRule
 
@@ -15,7 +17,7 @@ def convert_textures(
     textures: Sequence[TextureStatement],
     library: Path,
     output: Path,
-    metric: str,
+    metric: str | Metric,
     exponent_max: float,
     advance: Callable[[int], None],
 ) -> tuple[dict[str, str], list[tuple[int, str]]]:
@@ -27,7 +29,7 @@ def convert_textures(
         The ``map_Ns`` statements.
     library, output : Path
         The library, which the files are named relative to, and its conversion.
-    metric : str
+    metric : str or Metric
         What the fit keeps.
     exponent_max : float
         Exponent of a white texel.
@@ -42,7 +44,11 @@ def convert_textures(
         For each texture that cannot be converted its line and the reason.
     """
     rule = TextureRule(
-        "blinn-phong:exponent", "ggx:roughness", metric=metric, exponent_max=exponent_max
+        f"{SHININESS}:exponent",
+        ROUGHNESS,
+        method_for(metric_named(metric)),
+        str(metric),
+        exponent_max=exponent_max,
     )
     rule.endpoints()
     names: dict[str, str] = {}

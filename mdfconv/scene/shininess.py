@@ -6,19 +6,26 @@ GGX has at Pr 1; Pr 0 is a mirror, which no exponent reaches.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from mdfconv.conversion import convert
-from mdfconv.conversion.residual import residual
-from mdfconv.distributions import distribution
+from mdfconv.conversion import convert, method_named
+from mdfconv.conversion.endpoint import endpoints
+from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
 
-_SOURCE, _TARGET = "blinn-phong", "ggx:roughness"
-# From here on the stored polynomials answer.
+SHININESS, ROUGHNESS = "blinn-phong", "ggx:roughness"
+# From here on the stored polynomials answer, where there are some for the metric.
 _LEAST_STORED = 0.1
+# Pr at these is 1 − 2e-7 and 4e-5: no library means anything beyond.
 _LEAST, _MOST = 1e-6, 1e18
-_BISECTIONS = 70
+
+
+def method_for(metric: Metric) -> str:
+    """Return the name of the method that fits under a metric: the stored fits where they are."""
+    return "fast" if method_named("fast").covers_metric(metric) else "fit"
 
 
 def roughness_of(exponent: Array, metric: Metric) -> Array:
@@ -29,19 +36,19 @@ def roughness_of(exponent: Array, metric: Metric) -> Array:
     exponent : numpy.ndarray, shape (n,)
         Ns ≥ 0.
     metric : Metric
-        What the fit keeps; display at exposure 1.
+        What the fit keeps.
 
     Returns
     -------
     numpy.ndarray, shape (n,)
         Pr from 0 to 1; 1 for Ns 0, which is uniform.
     """
-    found = np.ones_like(exponent)
+    roughness = np.ones_like(exponent)
     stored = exponent >= _LEAST_STORED
-    found[stored] = convert(exponent[stored], _SOURCE, _TARGET, "fast", metric=metric)
     rest = (exponent >= _LEAST) & ~stored
-    found[rest] = convert(exponent[rest], _SOURCE, _TARGET, "fit", metric=metric)
-    return found
+    for rows, method in ((stored, method_for(metric)), (rest, "fit")):
+        roughness[rows] = convert(exponent[rows], SHININESS, ROUGHNESS, method, metric=metric)
+    return roughness
 
 
 def exponent_of(roughness: Array, metric: Metric) -> Array:
@@ -57,14 +64,20 @@ def exponent_of(roughness: Array, metric: Metric) -> Array:
     Returns
     -------
     numpy.ndarray, shape (n,)
-        Ns ≥ 0.
+        Ns, 0 for Pr 1 and otherwise from 1e-6 to 1e18.
     """
-    low, high = np.full(roughness.shape, np.log(_LEAST)), np.full(roughness.shape, np.log(_MOST))
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        too_rough = roughness_of(np.exp(middle), metric) > roughness
-        low, high = np.where(too_rough, middle, low), np.where(too_rough, high, middle)
-    return np.where(roughness < 1, np.exp(0.5 * (low + high)), 0.0)
+    from scipy.optimize import elementwise
+
+    def difference(log_exponent: Array, roughness: Array) -> Array:
+        return roughness_of(np.exp(log_exponent), metric) - roughness
+
+    ends = np.log([_LEAST, _MOST])
+    roughest, smoothest = roughness_of(np.exp(ends), metric)
+    bracket = tuple(np.full(roughness.shape, end) for end in ends)
+    root = elementwise.find_root(
+        difference, bracket, args=(np.clip(roughness, smoothest, roughest),)
+    )
+    return np.where(roughness < 1, np.exp(root.x), 0.0)
 
 
 def error_of(exponent: Array, roughness: Array, metric: Metric) -> Array:
@@ -82,12 +95,17 @@ def error_of(exponent: Array, roughness: Array, metric: Metric) -> Array:
     numpy.ndarray, shape (n,)
         RMSE; infinite for a mirror (Pr 0).
     """
-    sides = distribution("blinn-phong"), distribution("ggx")
-    there = roughness > 0
-    given = np.maximum(exponent[there], _LEAST)
-    found = np.full_like(roughness, np.inf)
-    found[there] = residual(sides[0], given, sides[1], np.square(roughness[there]), metric)[0]
-    return found
+    source, target = endpoints(SHININESS, ROUGHNESS)
+    lobes = roughness > 0
+    rmse = np.full_like(roughness, np.inf)
+    rmse[lobes], _ = remaining_error(
+        source.distribution,
+        np.maximum(exponent[lobes], _LEAST),
+        target.distribution,
+        target.decode(roughness[lobes]),
+        metric,
+    )
+    return rmse
 
 
 # What importers in wide use make of Ns; beyond the ends of [0, 1] they clip.
@@ -102,3 +120,33 @@ def importer_roughness(rule: str, exponent: Array) -> Array:
     """Return the roughness that one of `IMPORTER_RULES` gives for an exponent."""
     clipped: Array = np.clip(IMPORTER_RULES[rule](exponent), 0, 1)
     return clipped
+
+
+@dataclass(frozen=True)
+class ImporterResult:
+    """What an importer makes of an exponent.
+
+    Parameters
+    ----------
+    rule : str
+        One of `IMPORTER_RULES`.
+    roughness : float
+        Pr by that rule.
+    rmse : float
+        The error that it leaves, as `error_of`; infinite for a mirror.
+    """
+
+    rule: str
+    roughness: float
+    rmse: float
+
+
+def importer_results(exponent: Array, metric: Metric) -> list[tuple[ImporterResult, ...]]:
+    """Return what each of `IMPORTER_RULES` makes of each exponent, shape (n,)."""
+    by_rule = []
+    for rule in IMPORTER_RULES:
+        roughness = importer_roughness(rule, exponent)
+        rmse = error_of(exponent, roughness, metric)
+        pairs = zip(roughness.tolist(), rmse.tolist(), strict=True)
+        by_rule.append([ImporterResult(rule, *pair) for pair in pairs])
+    return list(zip(*by_rule, strict=True))

@@ -61,16 +61,18 @@ def convert_texture(
     >>> convert_texture(np.array([0, 26, 255], np.uint8), rule)
     array([255,  91,  52], dtype=uint8)
     """
-    given = np.asarray(array)
-    if dither and given.ndim != 2:
-        raise MdfconvError(f"dither takes an array of rows and columns, not of shape {given.shape}")
-    texels = TexelMap(rule, given.dtype, depth, given.shape[1] if dither else None)
-    converted = np.empty(given.shape, texels.dtype)
-    rows, places = (side if dither else side.reshape(-1, 1) for side in (given, converted))
+    texels = np.asarray(array)
+    if dither and texels.ndim != 2:
+        raise MdfconvError(
+            f"dither takes an array of rows and columns, not of shape {texels.shape}"
+        )
+    convert = TexelMap(rule, texels.dtype, depth, texels.shape[1] if dither else None)
+    converted = np.empty(texels.shape, convert.dtype)
+    rows, results = (each if dither else each.reshape(-1, 1) for each in (texels, converted))
     step = _rows_a_block(rows.shape[1])
     for start in range(0, len(rows), step):
-        places[start : start + step] = texels(rows[start : start + step])
-    for note in texels.report().notes(ends=False)[:1]:
+        results[start : start + step] = convert(rows[start : start + step])
+    for note in convert.report().notes(ends=False)[:1]:
         warnings.warn(note, MdfconvWarning, stacklevel=2)
     return converted
 
@@ -124,27 +126,28 @@ def convert_texture_file(
     """
     source, output = Path(source), Path(output)
     ValueConverter(rule)  # names are wrong more often than files
-    given_form, form = check_files(source, output, lossy=lossy)
+    source_form, form = check_files(source, output, lossy=lossy)
     with staged(output) as beside:
-        given = open_picture(source, given_form, channel, lossy=lossy, max_pixels=max_pixels)
-        texels = TexelMap(rule, given.dtype, depth, given.width if dither else None)
-        converted = given if texels.dtype == given.dtype else blank(given, texels.dtype)
-        with progress("rows", given.height) if progress else nullcontext(_ignore) as advance:
-            _convert(given, converted, texels, advance)
+        picture = open_picture(source, source_form, channel, lossy=lossy, max_pixels=max_pixels)
+        convert = TexelMap(rule, picture.dtype, depth, picture.width if dither else None)
+        same_depth = convert.dtype == picture.dtype
+        converted = picture if same_depth else blank(picture, convert.dtype)
+        with progress("rows", picture.height) if progress else nullcontext(_ignore) as advance:
+            _convert(picture, converted, convert, advance)
         converted.save(beside, form)
-    return texels.report()
+    return convert.report()
 
 
 def _convert(
-    given: Picture, converted: Picture, texels: TexelMap, advance: Callable[[int], None]
+    picture: Picture, converted: Picture, convert: TexelMap, advance: Callable[[int], None]
 ) -> None:
     """Convert row by row, into the same picture or into one of another depth."""
-    step = _rows_a_block(given.width)
-    for top in range(0, given.height, step):
-        block = given.read(top, min(top + step, given.height))
-        channel = texels(block[..., given.channel])
-        block = _rescaled(block, texels.dtype)
-        block[..., given.channel] = channel
+    step = _rows_a_block(picture.width)
+    for top in range(0, picture.height, step):
+        block = picture.read(top, min(top + step, picture.height))
+        channel = convert(block[..., picture.channel])
+        block = _rescaled(block, convert.dtype)
+        block[..., picture.channel] = channel
         converted.write(top, block)
         advance(len(block))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mdfconv.reports.figures import PAGE, encoded, line_style, pyplot
+from mdfconv.output.figures import PAGE, encoded, line_style, pyplot
 from mdfconv.scene.texture_map import BINS, TextureReport
 
 
@@ -14,7 +14,7 @@ def draw_histograms(report: TextureReport, title: str, dpi: int = 150) -> bytes:
     Parameters
     ----------
     report : TextureReport
-        What the conversion found.
+        What the conversion did.
     title : str
         What was converted.
     dpi : int
@@ -23,8 +23,8 @@ def draw_histograms(report: TextureReport, title: str, dpi: int = 150) -> bytes:
     plt = pyplot()
     figure, panels = plt.subplots(2, 1, figsize=PAGE, sharex=True, sharey=True)
     edges = np.linspace(0, 1, BINS + 1)
-    sides = (report.source, report.before), (report.target, report.after)
-    for panel, (name, counts) in zip(panels, sides, strict=True):
+    histograms = (report.source, report.before), (report.target, report.after)
+    for panel, (name, counts) in zip(panels, histograms, strict=True):
         color = line_style(name.partition(":")[0])["color"]
         shares = 100 * counts / max(1, counts.sum())
         panel.stairs(shares, edges, fill=True, color=color, alpha=0.35)

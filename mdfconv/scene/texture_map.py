@@ -21,12 +21,12 @@ _TABLED = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float16))
 _TYPES = (*_TABLED, np.dtype(np.float32), np.dtype(np.float64))
 
 
-def result_type(given: np.dtype[Any], depth: int | None, dither: bool) -> np.dtype[Any]:
+def result_type(dtype: np.dtype[Any], depth: int | None, dither: bool) -> np.dtype[Any]:
     """Return the type of the converted texels.
 
     Parameters
     ----------
-    given : numpy.dtype
+    dtype : numpy.dtype
         That of the texture.
     depth : int or None
         Bits of an integer texel, 8 or 16; None keeps the type.
@@ -38,10 +38,10 @@ def result_type(given: np.dtype[Any], depth: int | None, dither: bool) -> np.dty
     MdfconvError
         If it is no type of a texture, or cannot have the depth or be dithered.
     """
-    native = given.newbyteorder("=")
+    native = dtype.newbyteorder("=")
     if native not in _TYPES:
-        names = ", ".join(entry.name for entry in _TYPES)
-        raise MdfconvError(f"a texture is an array of {names}, not {given.name}")
+        names = ", ".join(known.name for known in _TYPES)
+        raise MdfconvError(f"a texture is an array of {names}, not {dtype.name}")
     if depth is not None:
         if depth not in DEPTHS:
             raise MdfconvError(f"the depth of a texture is 8 or 16 bits, not {depth}")
@@ -102,7 +102,7 @@ class TexelMap:
     ----------
     rule : TextureRule
         What to convert, and how.
-    given : numpy.dtype
+    dtype : numpy.dtype
         Type of the texels.
     depth : int or None
         Bits of the result, 8 or 16; None keeps the type.
@@ -116,26 +116,26 @@ class TexelMap:
     """
 
     def __init__(
-        self, rule: TextureRule, given: np.dtype[Any], depth: int | None, width: int | None = None
+        self, rule: TextureRule, dtype: np.dtype[Any], depth: int | None, width: int | None = None
     ) -> None:
-        self.dtype = result_type(given, depth, width is not None)
-        self._given = given.newbyteorder("=")
+        self.dtype = result_type(dtype, depth, width is not None)
+        self._source_dtype = dtype.newbyteorder("=")
         self._convert = ValueConverter(rule)
         self._dither = None if width is None else ErrorDiffusion(width)
         self._outcomes = np.zeros(len(Outcome), np.int64)
         self._before, self._after = (np.zeros(BINS, np.int64) for _ in range(2))
-        self._table = self._tabled() if self._given in _TABLED else None
+        self._table = self._tabled() if self._source_dtype in _TABLED else None
 
     def __call__(self, block: NDArray[Any]) -> NDArray[Any]:
         """Convert some texels, any shape; with dither the next rows, shape (rows, width)."""
-        texels = block.astype(self._given, copy=False)
+        texels = block.astype(self._source_dtype, copy=False)
         if self._table is None:
             values, outcomes = self._convert(texels.astype(np.float64))
             converted: NDArray[Any] = values.astype(self.dtype)
             self._outcomes += np.bincount(outcomes.ravel(), minlength=len(Outcome))
             self._before += _histogram(texels)
         else:
-            key = texels.view(f"u{self._given.itemsize}")
+            key = texels.view(f"u{self._source_dtype.itemsize}")
             self._counts += np.bincount(key.ravel(), minlength=self._counts.size)
             converted = self._table[key]
             if self._dither:
@@ -160,10 +160,12 @@ class TexelMap:
 
     def _tabled(self) -> NDArray[Any]:
         """Return the answer for every value of the type, in levels if it is dithered."""
-        every = np.arange(1 << 8 * self._given.itemsize).astype(f"u{self._given.itemsize}")
+        every = np.arange(1 << 8 * self._source_dtype.itemsize).astype(
+            f"u{self._source_dtype.itemsize}"
+        )
         self._counts = np.zeros(every.size, np.int64)
-        stored = every.view(self._given).astype(np.float64)
-        if self._given.kind == "u":
+        stored = every.view(self._source_dtype).astype(np.float64)
+        if self._source_dtype.kind == "u":
             stored /= every[-1]
         values, self._table_outcomes = self._convert(stored)
         if self.dtype.kind == "f":
@@ -172,8 +174,8 @@ class TexelMap:
         return levels.astype(np.float32) if self._dither else np.rint(levels).astype(self.dtype)
 
     def _histogram_of_counts(self) -> NDArray[np.int64]:
-        every = np.arange(self._counts.size).astype(f"u{self._given.itemsize}")
-        texels = every.view(self._given)
+        every = np.arange(self._counts.size).astype(f"u{self._source_dtype.itemsize}")
+        texels = every.view(self._source_dtype)
         known = ~np.isnan(texels)
         before = np.zeros(BINS, np.int64)
         np.add.at(before, _bins(texels[known]), self._counts[known])

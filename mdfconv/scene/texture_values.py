@@ -8,14 +8,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mdfconv.conversion.checks import check_covered
-from mdfconv.conversion.endpoint import Endpoint, same_family
-from mdfconv.conversion.registry import find_method
+from mdfconv.conversion.equivalence import exact_route, follow
+from mdfconv.conversion.methods import method_named
+from mdfconv.conversion.refusals import check_covered
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.metrics import metric as find_metric
+from mdfconv.fitting.metrics import metric_named
 from mdfconv.scene.texture_rule import TextureRule
 
+# Source values among which the roughest with an answer is looked for: those of sixteen bits.
 _GRID = 65536
 # Beyond 0..1 by less is rounding; a sixteen-bit texel is 1.5e-5.
 _ROUNDING = 1e-9
@@ -38,8 +39,8 @@ class ValueConverter:
 
     A value outside 0..1 is clamped into it first. The ends that are no legal parameter, the
     perfect mirror (α = 0) and the uniform lobe (N = 0), become the target's smoothest and
-    roughest values. Where the method has no answer, a surface rougher than it reaches takes the
-    roughest answer that it has, one that is smoother is a mirror. Results are clamped to 0..1.
+    roughest values. Where the method has no answer, a surface rougher than any that has one takes
+    the answer of the roughest, one that is smoother is a mirror. Results are clamped to 0..1.
     NaN stays NaN.
 
     Parameters
@@ -55,12 +56,15 @@ class ValueConverter:
 
     def __init__(self, rule: TextureRule) -> None:
         self._source, self._target = rule.endpoints()
-        self._method = find_method(rule.method)
-        self._metric = find_metric(rule.metric, rule.exposure)
-        self._same = same_family(self._source.distribution, self._target.distribution)
-        if not self._same:
+        self._method = method_named(rule.method)
+        self._metric = metric_named(rule.metric)
+        self._exact = exact_route(self._source.distribution, self._target.distribution)
+        if self._exact is None:
             check_covered(self._method, self._metric, self._source, self._target)
-        self._smooth = _smooth_end(self._source), _smooth_end(self._target)
+        # Which of 0 and 1 stands for the smoothest surface.
+        self._smoothest, self._smoothest_answer = (
+            float(end.stored.larger_is_smoother) for end in (self._source, self._target)
+        )
 
     @property
     def labels(self) -> tuple[str, str]:
@@ -77,49 +81,51 @@ class ValueConverter:
         outcomes : numpy.ndarray of uint8
             What became of each, as `Outcome`.
         """
-        given = np.clip(stored, 0, 1)
-        result, legal = self._answers(given)
+        clipped = np.clip(stored, 0, 1)
+        result, legal = self._answers(clipped)
         answered = ~np.isnan(result)
         value = np.clip(result, 0, 1)
-        outcome = np.full(given.shape, Outcome.ANSWERED, np.uint8)
+        outcome = np.full(clipped.shape, Outcome.ANSWERED, np.uint8)
         with np.errstate(invalid="ignore"):
             outcome[np.abs(result - value) > _ROUNDING] = Outcome.CLAMPED
         if not answered.all():
-            smooth = (given < 0.5) == (self._smooth[0] == 0)
-            ends = np.where(smooth, self._smooth[1], 1 - self._smooth[1])
+            smooth = (clipped < 0.5) == (self._smoothest == 0)
+            ends = np.where(smooth, self._smoothest_answer, 1 - self._smoothest_answer)
             value = np.where(legal, value, ends)
             outcome[~legal] = np.where(smooth, Outcome.MIRROR, Outcome.UNIFORM)[~legal]
             missing = legal & ~answered
             if missing.any():
-                value[missing] = self._nearest(given[missing])
+                value[missing] = self._nearest(clipped[missing])
                 outcome[missing] = Outcome.UNANSWERED
         nan = np.isnan(stored)
         value[nan] = np.nan
-        outcome[given != stored] = Outcome.OUTSIDE
+        outcome[clipped != stored] = Outcome.OUTSIDE
         outcome[nan] = Outcome.NAN
         return value, outcome
 
-    def _answers(self, given: Array) -> tuple[Array, NDArray[np.bool_]]:
+    def _answers(self, stored: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return the encoded answers, NaN where there is none, and which values are legal."""
-        parameter = self._source.decode_legal(given)
+        parameter = self._source.decode_legal(stored)
         legal = ~np.isnan(parameter)
-        kept = result = parameter[legal]
         pair = self._source.distribution, self._target.distribution
         with np.errstate(all="ignore"):
-            if not self._same:
-                result = np.asarray(self._method.convert(kept, *pair, self._metric))
-                result = np.where(pair[1].parameter.accepts(result), result, np.nan)
+            if self._exact is None:
+                result = np.asarray(self._method.convert(parameter[legal], *pair, self._metric))
+            else:
+                result = follow(self._exact, parameter[legal])
+            result = np.where(pair[1].parameter.accepts(result), result, np.nan)
+            # Not `Endpoint.encode`: what cannot be stored is to be clamped.
             if self._target.encoding:
                 result = self._target.encoding.encode(result)
-        answers = np.full(given.shape, np.nan)
+        answers = np.full(stored.shape, np.nan)
         answers[legal] = result
         return answers, legal
 
-    def _nearest(self, given: Array) -> Array:
+    def _nearest(self, stored: Array) -> Array:
         """Return what legal values without an answer become."""
         roughest, answer = self._roughest
-        rougher = self._roughness(given) > self._roughness(roughest)
-        nearest: Array = np.where(rougher, answer, self._smooth[1])
+        rougher = self._roughness(stored) > self._roughness(roughest)
+        nearest: Array = np.where(rougher, answer, self._smoothest_answer)
         return nearest
 
     @cached_property
@@ -134,14 +140,9 @@ class ValueConverter:
                 f"to {self._target.label}"
             )
         grid, answers = grid[answered], answers[answered]
-        place = int(np.argmax(self._roughness(grid)))
-        return grid[place], float(np.clip(answers[place], 0, 1))
+        index = int(np.argmax(self._roughness(grid)))
+        return grid[index], float(np.clip(answers[index], 0, 1))
 
-    def _roughness(self, given: Array) -> Array:
-        return given if self._smooth[0] == 0 else 1 - given
-
-
-def _smooth_end(side: Endpoint) -> float:
-    """Return which of 0 and 1 stands for the smoother surface."""
-    first, last = side.distribution.peak_alpha(side.decode([0.25, 0.75]))
-    return 0.0 if first < last else 1.0
+    def _roughness(self, stored: Array) -> Array:
+        """Return numbers that rise with the roughness."""
+        return stored if self._smoothest == 0 else 1 - stored

@@ -12,19 +12,19 @@ from PIL import Image
 from scipy.optimize import minimize_scalar
 
 import mdfconv
-from mdfconv.benchmark.labels import place_labels
 from mdfconv.benchmark.loop import curve_fit_loop
 from mdfconv.benchmark.methods import answers, method_speeds, sweep
 from mdfconv.benchmark.pareto import front
 from mdfconv.benchmark.substitutes import substitutes
 from mdfconv.benchmark.timing import Sizes, interleave, spread
-from mdfconv.cli.names import one_parameter_distributions
-from mdfconv.conversion import find_method
-from mdfconv.fitting.metrics import list_metrics, metric
-from mdfconv.reports.figures import pyplot
+from mdfconv.conversion import method_named
+from mdfconv.distributions import one_parameter_distributions
+from mdfconv.fitting.metrics import list_metrics, metric_named
+from mdfconv.output.figures import pyplot
+from mdfconv.output.labels import place_labels
 from tests.cli.runner import run, run_on_terminal
 
-TINY = Sizes(angles=512, conversions=64, fits=4, loop=2, rounds=2)
+TINY = Sizes(angles=512, conversions=64, fits=4, loop=2, rounds=1)
 NAMES = [entry.name for entry in one_parameter_distributions()]
 
 
@@ -46,34 +46,34 @@ def quick(tmp_path_factory):
 def test_tables_are_the_same_in_csv_and_json(quick):
     files, _, err = quick
     assert [line.split()[:2] for line in err.splitlines()] == [["mdfconv:", "wrote"]] * 3
-    found = json.loads(files["json"].read_text())
+    report = json.loads(files["json"].read_text())
     rows = list(csv.DictReader(io.StringIO(files["csv"].read_text())))
     for name in ("substitutes", "methods", "kernels"):
         own = [row for row in rows if row["table"] == name]
-        assert len(own) == len(found[name])
-        for row, record in zip(own, found[name], strict=True):
+        assert len(own) == len(report[name])
+        for row, record in zip(own, report[name], strict=True):
             for column, value in record.items():
                 assert row[column] == ("nan" if value is None else str(value))
-    assert found["machine"]["numpy"] == np.__version__
-    assert found["machine"]["cpu"]
-    assert all(found["verdicts"].values())
+    assert report["machine"]["numpy"] == np.__version__
+    assert report["machine"]["cpu"]
+    assert all(report["verdicts"].values())
 
 
 def test_quick_run_holds_every_row_and_times_with_their_spread(quick):
-    found = json.loads(quick[0]["json"].read_text())
-    assert [row["distribution"] for row in found["substitutes"]] == 2 * NAMES
-    assert [row["distribution"] for row in found["kernels"]] == 2 * NAMES
+    report = json.loads(quick[0]["json"].read_text())
+    assert [row["distribution"] for row in report["substitutes"]] == 2 * NAMES
+    assert [row["distribution"] for row in report["kernels"]] == 2 * NAMES
     covering = {"closed-form", "half-angle", "peak", "fit", "curve_fit"}
-    assert covering <= {row["method"] for row in found["methods"]}
+    assert covering <= {row["method"] for row in report["methods"]}
     for table, times in (
         ("substitutes", ("ns_float64", "ns_float32")),
         ("methods", ("per_second",)),
         ("kernels", ("kernel_ns", "textbook_ns", "floor_ns", "copy_ns")),
     ):
-        for row in found[table]:
+        for row in report[table]:
             for name in times:
                 assert 0 < row[f"{name}_low"] <= row[name] <= row[f"{name}_high"]
-    for row in found["kernels"]:
+    for row in report["kernels"]:
         assert 1 <= row["memory"] < 1.2
 
 
@@ -125,26 +125,28 @@ def test_terminal():
     assert "no such option" in out
 
 
-@pytest.mark.parametrize(("source", "given"), [("beckmann", 0.2), ("ggx", 1.0)])
-def test_energy_error_is_the_least_share_of_the_light(source, given):
+@pytest.mark.parametrize(("source", "parameter"), [("beckmann", 0.2), ("ggx", 1.0)])
+def test_energy_error_is_the_least_share_of_the_light(source, parameter):
     entry = mdfconv.distribution(source)
-    found = substitutes(entry, np.array([given]), one_parameter_distributions(), TINY, ignore)
+    measured = substitutes(
+        entry, np.array([parameter]), one_parameter_distributions(), TINY, ignore
+    )
     beta = (np.arange(200_000) + 0.5) * np.pi / 400_000
-    wanted = entry.normalized(beta, given)
+    wanted = entry.normalized(beta, parameter)
 
     def share(log_parameter, name):
         got = mdfconv.distribution(name).normalized(beta, np.exp(log_parameter))
         weight = np.sin(2 * beta)
         return np.sqrt(np.sum(weight * (got - wanted) ** 2) / np.sum(weight * wanted**2))
 
-    rows = {row.distribution: row for row in found}
+    rows = {row.distribution: row for row in measured}
     assert rows[source].rmse == rows[source].energy_error == 0
     for name, near in (("ggx", 0.18), ("blinn-phong", 50.0), ("sawicki", 60.0)):
         if source == "beckmann":
             bounds = np.log([near / 2, near * 2])
             least = minimize_scalar(share, bounds=bounds, args=(name,), method="bounded").fun
             assert rows[name].energy_error == pytest.approx(least, rel=1e-4)
-            answer = mdfconv.explain(given, source, name, "fit")[0]
+            answer = mdfconv.explain(parameter, source, name, "fit")[0]
             assert rows[name].parameter == answer.result
             assert (rows[name].rmse, rows[name].max_error) == (answer.rmse, answer.max_error)
     # A uniform GGX has no Gaussian; its time is measured all the same.
@@ -159,8 +161,8 @@ def test_loop_of_curve_fit_finds_the_same_minimum(name):
     source, target = map(mdfconv.distribution, ("beckmann", "ggx"))
     values = sweep(source, 3)
     assert values[[0, -1]] == pytest.approx([0.0044721, 0.44721], rel=1e-4)
-    looped = curve_fit_loop(source, values, target, metric(name))
-    fitted = answers(find_method("fit"), values, source, target, metric(name))
+    looped = curve_fit_loop(source, values, target, metric_named(name))
+    fitted = answers(method_named("fit"), values, source, target, metric_named(name))
     # Its samples do not end where a screen clips to white.
     tolerance = 1e-3 if name == "display" else 1e-5
     np.testing.assert_allclose(looped, fitted, rtol=tolerance)
@@ -171,13 +173,13 @@ def test_loop_of_curve_fit_finds_the_same_minimum(name):
     [("beckmann", "blinn-phong"), ("ggx", "smoothie"), ("sawicki", "schlick"), ("gauss", "gtr")],
 )
 def test_methods_of_any_pair(source, target):
-    found = method_speeds(*map(mdfconv.distribution, (source, target)), TINY, ignore)
-    methods = {row.method for row in found}
+    measured = method_speeds(*map(mdfconv.distribution, (source, target)), TINY, ignore)
+    methods = {row.method for row in measured}
     assert ("ward" in methods) == (source in ("beckmann", "ggx"))
-    fits = [row for row in found if row.method == "fit"]
+    fits = [row for row in measured if row.method == "fit"]
     assert [row.metric for row in fits] == list_metrics()
     assert all(row.parameter_error_max == 0 and row.answered == 1 for row in fits)
-    closed = next(row for row in found if row.method == "closed-form")
+    closed = next(row for row in measured if row.method == "closed-form")
     assert closed.metric == "unit"
     assert closed.rmse_max >= closed.rmse
     assert closed.values in (TINY.conversions, TINY.fits)

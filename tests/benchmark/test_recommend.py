@@ -8,7 +8,10 @@ import pytest
 
 import mdfconv
 from mdfconv.benchmark.recommendation import Candidate, choose
+from mdfconv.distributions import one_parameter_distributions
 from tests.cli.runner import run, run_on_terminal
+
+NAMES = [entry.name for entry in one_parameter_distributions()]
 
 
 def candidate(name, ns, operations, error):
@@ -42,20 +45,20 @@ def answer(*arguments):
 
 
 def test_answer_is_within_the_tolerance_and_explained():
-    found = answer("--from", "beckmann", 0.2, "--tolerance", 0.05)
-    first, *rest = found["candidates"]
-    assert found["chosen"] == first["distribution"]
+    answered = answer("--from", "beckmann", 0.2, "--tolerance", 0.05)
+    first, *rest = answered["candidates"]
+    assert answered["chosen"] == first["distribution"]
     assert first["chosen"]
     assert not any(row["chosen"] for row in rest)
-    within = [row for row in found["candidates"] if row["within"]]
+    within = [row for row in answered["candidates"] if row["within"]]
     # The shape of Beckmann is not GGX's, whatever the machine.
     assert {row["distribution"] for row in within} == {
         "beckmann", "gauss", "blinn-phong", "sawicki",
     }  # fmt: skip
-    assert all((row["max_error"] <= 0.05) == row["within"] for row in found["candidates"])
-    assert found["candidates"][: len(within)] == within
-    assert first["distribution"] in found["reason"]
-    for row in found["candidates"]:
+    assert all((row["max_error"] <= 0.05) == row["within"] for row in answered["candidates"])
+    assert answered["candidates"][: len(within)] == within
+    assert first["distribution"] in answered["reason"]
+    for row in answered["candidates"]:
         if row["method"] != "none":
             name, method = row["distribution"], row["method"]
             same = mdfconv.explain(0.2, "beckmann", name, method)[0]
@@ -65,23 +68,23 @@ def test_answer_is_within_the_tolerance_and_explained():
 
 
 def test_nothing_else_is_near_enough():
-    found = answer("--from", "beckmann", 0.2, "--tolerance", 1e-4)
-    assert found["chosen"] == "beckmann"
-    assert found["candidates"][0]["method"] == "none"
-    assert found["reason"].startswith("keep beckmann: nothing else")
+    answered = answer("--from", "beckmann", 0.2, "--tolerance", 1e-4)
+    assert answered["chosen"] == "beckmann"
+    assert answered["candidates"][0]["method"] == "none"
+    assert answered["reason"].startswith("keep beckmann: nothing else")
 
 
 def test_metric_and_encoding():
-    found = answer("--from", "ggx:roughness", 0.5, "--metric", "display", "--exposure", 2)
-    assert found["from"] == "ggx:roughness"
-    row = next(row for row in found["candidates"] if row["distribution"] == "ggx")
+    answered = answer("--from", "ggx:roughness", 0.5, "--metric", "display", "--exposure", 2)
+    assert answered["from"] == "ggx:roughness"
+    row = next(row for row in answered["candidates"] if row["distribution"] == "ggx")
     assert row["parameter"] == 0.25
-    # Smoothie and GTR with γ = 2 are GGX: as near as the source, though not as few operations.
-    assert {row["distribution"] for row in found["candidates"] if row["within"]} == {
-        "ggx", "gtr", "smoothie",
+    # Smoothie, and GTR and Student-t at γ = 2, are GGX: as near, though not as few operations.
+    assert {row["distribution"] for row in answered["candidates"] if row["within"]} == {
+        "ggx", "gtr", "smoothie", "student-t",
     }  # fmt: skip
-    other = next(row for row in found["candidates"] if row["distribution"] == "beckmann")
-    same = mdfconv.explain(0.25, "ggx", "beckmann", "fit", metric="display", exposure=2)[0]
+    other = next(row for row in answered["candidates"] if row["distribution"] == "beckmann")
+    same = mdfconv.explain(0.25, "ggx", "beckmann", "fit", metric="display:2")[0]
     assert other["max_error"] == pytest.approx(same.max_error, rel=1e-6)
 
 
@@ -96,7 +99,7 @@ def test_csv_and_markdown():
     status, out, _ = run(*arguments, "csv")
     assert status == 0
     rows = list(csv.DictReader(io.StringIO(out)))
-    assert [row["chosen"] for row in rows] == ["True"] + ["False"] * 7
+    assert [row["chosen"] for row in rows] == ["True"] + ["False"] * (len(NAMES) - 1)
     assert rows[0]["distribution"] == "beckmann"
     status, out, err = run(*arguments, "markdown")
     assert (status, err) == (0, "")

@@ -10,9 +10,12 @@ import pytest
 
 import mdfconv
 from mdfconv.benchmark.stability import audit
+from mdfconv.benchmark.stability_conversions import printed_conversion
 from mdfconv.benchmark.stability_finding import Tally, read_rows, relative_errors
-from mdfconv.benchmark.stability_textbook import printed_conversion, printed_kernel
-from mdfconv.reports.build import stability
+from mdfconv.benchmark.stability_kernels import printed_form
+from mdfconv.conversion import method_named
+from mdfconv.conversion.endpoint import Endpoint
+from mdfconv.reports.stability_page import stability_page
 from tests import generate_stability, oracles, stability_fits
 from tests.cli.runner import run
 
@@ -37,46 +40,48 @@ def test_everything_is_audited(findings):
             assert {(name, "unit", dtype), (name, "normalized", dtype)} <= kernels
     rules = {f.rule.split()[0] for f in findings}
     assert {method.name for method in mdfconv.list_methods()} <= rules
-    assert {"tail", "mirror-smooth", "grazing", "off-axis maximum", "γ near 1"} <= {
-        f.regime for f in findings
-    }
+    regimes = {f.regime for f in findings}
+    assert {"tail", "mirror-smooth", "grazing", "off-axis maximum"} <= regimes
+    assert {"γ near 1", "γ near 2", "edge of support"} <= regimes
+    assert all(f.cases for f in findings)
 
 
 def test_kernels_hold(findings):
-    for found in findings:
-        if found.rule in ("unit", "normalized"):
-            limit = HARDER.get(found.regime, KERNEL_LIMITS[found.dtype])
-            assert found.error_in_eps <= limit, found
+    for finding in findings:
+        if finding.rule in ("unit", "normalized"):
+            limit = HARDER.get(finding.regime, KERNEL_LIMITS[finding.dtype])
+            assert finding.error_in_eps <= limit, finding
 
 
 def test_conversions_hold(findings):
-    for found in findings:
-        if found.rule in ("unit", "normalized") or found.rule.endswith("back"):
+    for finding in findings:
+        if finding.rule in ("unit", "normalized") or finding.rule.endswith("back"):
             continue
-        limit = FIT_LIMITS.get(found.rule.split()[0], 1e-12)
-        rounding = 6.1e-8 if found.dtype == "float32" else 0
-        assert found.error <= limit + rounding, found
+        limit = FIT_LIMITS.get(finding.rule.split()[0], 1e-12)
+        rounding = 6.1e-8 if finding.dtype == "float32" else 0
+        assert finding.error <= limit + rounding, finding
 
 
 def test_round_trips_hold_in_double_precision(findings):
     trips = [f for f in findings if f.rule.endswith("and back") and f.dtype == "float64"]
     assert len(trips) > 30
-    for found in trips:
-        limit = 1e-13 if found.regime == "mirror-smooth" else LOOSE.get(found.rule, 1e-15)
-        if found.rule == "glossiness and back":
+    for finding in trips:
+        limit = 1e-13 if finding.regime == "mirror-smooth" else LOOSE.get(finding.rule, 1e-15)
+        if finding.rule == "glossiness and back":
             limit = 1e-11
-        assert found.error <= limit, found
+        assert finding.error <= limit, finding
 
 
 def test_what_the_printed_forms_lose(findings):
-    found = {(f.distribution, f.rule, f.regime, f.dtype): f.textbook for f in findings}
+    textbook = {(f.distribution, f.rule, f.regime, f.dtype): f.textbook for f in findings}
     for name in ("ggx", "gtr", "schlick", "sawicki", "blinn-phong"):
-        assert found[name, "unit", "mirror-smooth", "float64"] > 0.1
-    assert found["gtr", "normalized", "γ near 1", "float64"] == "NaN"
-    assert found["ggx", "half-angle", "mirror-smooth", "float64"] == "inf"
-    assert found["gauss", "half-angle and back", "mirror-smooth", "float32"] == "NaN"
-    assert found["schlick", "half-angle", "rough", "float64"] == ""
-    assert found["beckmann", "unit", "usual", "float64"] < 1e-14
+        assert textbook[name, "unit", "mirror-smooth", "float64"] > 0.1
+    assert textbook["student-t", "unit", "mirror-smooth", "float64"] == "NaN"
+    assert textbook["gtr", "normalized", "γ near 1", "float64"] == "NaN"
+    assert textbook["ggx", "half-angle", "mirror-smooth", "float64"] == "inf"
+    assert textbook["gauss", "half-angle and back", "mirror-smooth", "float32"] == "NaN"
+    assert textbook["schlick", "half-angle", "rough", "float64"] == ""
+    assert textbook["beckmann", "unit", "usual", "float64"] < 1e-14
 
 
 @pytest.mark.parametrize("dtype", generate_stability.DIGITS)
@@ -97,14 +102,22 @@ def test_stored_kernels_are_what_the_oracles_say(dtype):
 
 
 def test_stored_conversions_are_what_the_oracles_say():
-    for row in read_rows("conversions.csv")[::13]:
+    rows = read_rows("conversions.csv")
+    gammas = [str(gamma) for gamma in generate_stability.CONVERSION_GAMMAS]
+    assert list(dict.fromkeys(row["gamma"] for row in rows)) == gammas
+    for row in rows[::13]:
         method = getattr(generate_stability, row["method"].replace("-", "_"))
-        for target in generate_stability.NAMES:
-            if target == row["source"]:
-                continue
-            exact = method(row["source"], target, float(np.float32(row["value"])))
-            text = generate_stability.conversion_text(exact)
-            assert text == row[target], (row["source"], target)
+        gamma, value = float(row["gamma"]), float(np.float32(row["value"]))
+        exact = generate_stability.conversion_row(
+            method, row["source"], gamma, value, only_two=row["gamma"] != gammas[0]
+        )
+        assert {name: row[name] for name in generate_stability.NAMES} == exact
+
+
+def test_what_is_stored_are_all_distributions_of_their_own():
+    stored = {row["distribution"] for row in read_rows("kernels-float64.csv")}
+    assert stored == set(generate_stability.NAMES)
+    assert stored | {"ashikhmin-shirley"} == {e.name for e in mdfconv.list_distributions()}
 
 
 def test_a_stored_fit_is_the_minimum():
@@ -142,35 +155,59 @@ def test_a_missing_answer_is_the_worst():
     values = np.array([1, np.nan, 0.5], dtype=np.float32)
     exact = [Decimal("0.5"), Decimal("0.5"), Decimal("1e-60")]
     tally.add(values, values, exact, ["a", "b", "c"])
-    found = tally.finding()
-    assert np.isnan(found.error)
-    assert (found.worst, found.textbook, found.cases, found.out_of_range) == ("b", "NaN", 3, 1)
+    finding = tally.finding()
+    assert np.isnan(finding.error)
+    assert (finding.worst, finding.textbook, finding.cases, finding.out_of_range) == (
+        "b",
+        "NaN",
+        3,
+        1,
+    )
+
+
+def harmless(entry):
+    """Return a distribution at a γ of its own, and a parameter at which no digit is lost."""
+    gammas = {"gtr": 1.5, "student-t": 3.5}
+    shape = entry.with_gamma(gammas[entry.name]) if entry.second_parameter else entry
+    return shape, np.float64(30 if entry.parameter.larger_is_smoother else 0.3)
 
 
 def test_printed_formulas_where_they_are_harmless():
-    m = np.array([0.3])
-    for form in ("unit", "normalized"):
-        for entry in mdfconv.list_distributions():
-            # The paper's constant of the Gaussian is an approximation.
-            close = 0.03 if (entry.name, form) == ("gauss", "normalized") else 1e-12
-            parameter = 20 / m if entry.name in generate_stability.oracles.EXPONENTS else m
-            options = {"gamma": 1.5} if entry.name == "gtr" else {}
-            ours = getattr(entry, form)(0.2, parameter, **options)
-            printed = printed_kernel(entry.name, form, np.array([0.2]), parameter, np.array([1.5]))
-            np.testing.assert_allclose(printed, ours, rtol=close)
-    names = [entry.name for entry in mdfconv.list_distributions()]
-    for method in ("half-angle", "peak"):
-        covered = 0
-        for source in names:
-            for target in names:
-                given = np.array([30.0]) if source in oracles.EXPONENTS else m
-                printed = printed_conversion(method, source, target, given, np.array([1.5]))
+    entries = mdfconv.list_distributions()
+    for shape, parameter in map(harmless, entries):
+        angle = np.array([0.2])
+        np.testing.assert_allclose(
+            printed_form(shape, "unit", angle, parameter), shape.unit(angle, parameter), rtol=1e-12
+        )
+        # The paper's constant of the Gaussian is an approximation.
+        close = 0.03 if shape.name == "gauss" else 1e-12
+        normal = np.zeros(1)
+        np.testing.assert_allclose(
+            printed_form(shape, "normalized", normal, parameter),
+            shape.normalized(normal, parameter),
+            rtol=close,
+        )
+    for name in ("half-angle", "peak"):
+        method, covered = method_named(name), 0
+        for source, parameter in map(harmless, entries):
+            for target, _ in map(harmless, entries):
+                values = np.array([parameter])
+                printed = printed_conversion(method, source, target, values)
                 if printed is not None:
                     covered += 1
-                    ours = mdfconv.convert(given, source, target, method, gamma=1.5)
-                    close = 0.03 if source == "gauss" else 1e-11
+                    ends = Endpoint(source), Endpoint(target)
+                    ours = mdfconv.convert(values, *ends, name)
+                    close = 0.03 if source.name == "gauss" else 1e-11
                     np.testing.assert_allclose(printed, ours, rtol=close)
         assert covered > 40
+
+
+def test_printed_normalized_form_where_the_maximum_is_off_the_normal():
+    for name in ("beckmann", "student-t"):
+        shape = mdfconv.distribution(name)
+        shape = shape.with_gamma(4) if shape.second_parameter else shape
+        printed = printed_form(shape, "normalized", np.zeros(1), np.float64(2))
+        np.testing.assert_allclose(printed, shape.normalized(0.0, 2.0), rtol=1e-15)
 
 
 def test_command():
@@ -205,7 +242,7 @@ def test_output_file(tmp_path):
     [
         (("--mdf", "gx"), "did you mean ggx"),
         (("--part", "kernel"), "--part"),
-        (("--format", "plain"), "--format"),
+        (("--format", "html"), "--format"),
     ],
 )
 def test_bad_requests(arguments, words):
@@ -216,8 +253,8 @@ def test_bad_requests(arguments, words):
 
 
 def test_page():
-    artefact = stability()
-    assert artefact == stability()
+    artefact = stability_page()
+    assert artefact == stability_page()
     assert list(artefact.files) == ["stability.csv", "stability.md"]
     assert artefact.agreement.startswith("0 failures in ")
     rows = list(csv.DictReader(artefact.files["stability.csv"].decode().splitlines()))

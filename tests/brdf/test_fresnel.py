@@ -141,10 +141,10 @@ def test_the_fit_is_the_minimum(ior, mu, sigma):
 
 
 def test_the_page():
-    files, summary = fresnel_page()
-    assert set(files) == {"fresnel.md", "fresnel.csv", "fresnel.png"}
-    assert "within 0.5 %" in summary
-    rows = list(csv.DictReader(files["fresnel.csv"].decode().splitlines()))
+    page = fresnel_page()
+    assert set(page.files) == {"fresnel.md", "fresnel.csv", "fresnel.png"}
+    assert "within 0.5 %" in page.agreement
+    rows = list(csv.DictReader(page.files["fresnel.csv"].decode().splitlines()))
     middle = rows[50]
     assert float(middle["cosine"]) == 0.5
     assert float(middle["(1-x)^5"]) == 0.5**5
@@ -200,7 +200,7 @@ def test_the_command(tmp_path):
         (("--mu", "2.5"), "from 0 to 2"),
         (("--mu", "nan"), "from 0 to 2"),
         (("--sigma", "0"), "positive number"),
-        (("--sigma", "1e-4"), "raise --sigma"),
+        (("--sigma", "1e-4"), "narrower than the grid"),
         (("--png", "missing/curves.png"), "cannot write"),
         (("--png", "same.png", "--output", "same.png"), "two results"),
     ],

@@ -1,5 +1,6 @@
 """The white furnace: exact values, independent quadrature, energy that is not made."""
 
+import csv
 import json
 
 import mpmath as mp
@@ -11,6 +12,7 @@ from mdfconv.brdf.furnace import directional_albedo, sampled_albedo
 from mdfconv.brdf.models import furnace_model, list_models
 from mdfconv.brdf.phong import arvo, mallett_yuksel
 from mdfconv.brdf.smoothie import energy_response
+from mdfconv.reports.furnace_page import furnace_page
 from tests.cli.runner import run
 
 COSINES = np.array([0.0, 1e-6, 1e-3, 0.03, 0.2, 0.5, 0.77, 0.99, 1.0])
@@ -95,7 +97,7 @@ def test_against_quadrature_over_light(name, parameter):
     light = direction(theta, phi)
     for cosine in (0.3, 0.9):
         view = np.broadcast_to(direction(np.arccos(cosine)), light.shape)
-        wanted = 2 * np.sum(model.reflection(light, view) * light[..., 2] * area)
+        wanted = 2 * np.sum(model.brdf(light, view) * light[..., 2] * area)
         # The grid cuts across the end of Phong's lobe, and where n·l = n·v.
         tolerance = {"phong": 2e-4, "modified-phong": 2e-4, "ashikhmin-shirley": 2e-5}
         got = directional_albedo(model, np.array([cosine]))[0]
@@ -113,12 +115,20 @@ def test_sampling_agrees(name):
 
 
 def test_limits_of_smoothie():
-    albedo = directional_albedo(furnace_model("smoothie", 1e-3), np.array([1.0]))[0]
-    assert albedo == pytest.approx(np.pi / 4, abs=1e-4)
+    """The article's D has the integral π/(4+α²); here it is normalized."""
+    for alpha in (1e-3, 0.3):
+        albedo = directional_albedo(furnace_model("smoothie", alpha), np.array([1.0]))[0]
+        article = albedo * np.pi / (4 + alpha**2)
+        if alpha == 1e-3:
+            assert article == pytest.approx(np.pi / 4, abs=1e-4)
+        # GGX with the masking that the form implies.
+        ggx = alpha / np.sqrt(4 + alpha**2)
+        same = furnace_model("ggx", ggx, masking="ksk")
+        assert albedo == pytest.approx(directional_albedo(same, np.array([1.0]))[0], abs=1e-12)
     for alpha in (0.01, 0.5, 1.0):
         model = furnace_model("smoothie-approx", alpha)
         albedo = directional_albedo(model, np.array([1.0]))[0]
-        assert albedo == pytest.approx(1 / (1 + alpha**2), abs=1e-9)
+        assert albedo * 4 / (4 + alpha**2) == pytest.approx(1 / (1 + alpha**2), abs=1e-9)
 
 
 @pytest.mark.parametrize("alpha", [0.05, 0.5, 1.0])
@@ -131,6 +141,20 @@ def test_energy_response_by_quadrature(alpha):
 
     wanted = 2 * mp.pi * mp.quad(value, [0, a / 8, a / 2, 2 * a if 2 * a < 1.5 else 1.5, mp.pi / 2])
     assert energy_response(alpha) == pytest.approx(float(wanted), rel=1e-12)
+
+
+def test_the_page_states_what_its_data_say():
+    page = furnace_page()
+    rows = list(csv.DictReader(page.files["furnace.csv"].decode().splitlines()))
+    text = " ".join(page.files["furnace.md"].decode().split())
+    smooth = float(rows[-1]["Smoothie: smoothie 0.1"])
+    assert f"the exact form returns {smooth:.3g} to a viewer along the normal for α = 0.1" in text
+    article = smooth * np.pi / (4 + 0.1**2)
+    assert f"here {article:.3g}, and loses 21% of the light" in text
+    assert 1 - article > 0.21
+    unmasked = float(rows[2]["GGX: none"])
+    assert f"at cos θ = 0.1 GGX without it returns {unmasked:.2g}" in text
+    assert "within 1e-" in page.agreement
 
 
 def test_command(tmp_path):

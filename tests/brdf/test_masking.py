@@ -7,17 +7,22 @@ import numpy as np
 import pytest
 
 from mdfconv.brdf.directions import direction, dot, half_vector
-from mdfconv.brdf.masking import MASKINGS, masking, smith_g1, smith_lambda
-from mdfconv.brdf.microfacet import ashikhmin_shirley, density, reflection
+from mdfconv.brdf.fresnel import lossless
+from mdfconv.brdf.masking import MASKINGS, v_cavity
+from mdfconv.brdf.microsurface import Microsurface
 from mdfconv.brdf.phong import modified
-from mdfconv.brdf.smoothie import approximate, exact
-from mdfconv.distributions import distribution
+from mdfconv.brdf.reflection import ashikhmin_shirley, microfacet, smoothie, smoothie_approx
+from mdfconv.distributions import distribution, list_distributions
 from mdfconv.errors import MdfconvError
 from tests import oracles
 
 assert oracles.mp.mp.dps >= 50
 RANDOM = np.random.default_rng(11)
 ALPHAS = [1e-4, 0.01, 0.3, 1.0]
+
+
+def surface(name, parameter):
+    return Microsurface(distribution(name), parameter)
 
 
 def hemisphere(count):
@@ -32,7 +37,7 @@ def test_lambda_at_fifty_digits(name):
         [1e-4, 0.01, 0.5, 1.0], [0, 1e-6, 0.3, 1.2, 1.57, np.pi / 2 - 1e-9]
     ):
         omega = direction(theta)
-        got = float(smith_lambda(name, omega, alpha))
+        got = float(surface(name, alpha).smith_lambda(omega))
         slope = mp.mpf(alpha) * mp.mpf(float(omega[0])) / mp.mpf(float(omega[2]))
         if name == "ggx":
             wanted = (mp.sqrt(1 + slope**2) - 1) / 2
@@ -51,8 +56,8 @@ def test_visible_area_is_the_projected_area(name, alpha):
         omega = direction(theta, azimuth)
         m, weight = slopes(omega, alpha)
         facing = np.maximum(dot(omega, m), 0)
-        value = density(distribution(name), alpha, m) * facing * weight
-        g1 = 1 / (1 + smith_lambda(name, omega, alpha))
+        value = surface(name, alpha).density(m) * facing * weight
+        g1 = 1 / (1 + surface(name, alpha).smith_lambda(omega))
         assert float(g1 * value.sum()) == pytest.approx(np.cos(theta), abs=1e-8)
 
 
@@ -90,26 +95,18 @@ def panels(edges, x, w):
 
 
 def brdfs():
-    pairs = [(name, kind) for name in ("ggx", "beckmann") for kind in MASKINGS]
+    pairs = [(name, kind) for name in ("ggx", "beckmann") for kind in MASKINGS.names]
     for (name, kind), alpha in itertools.product(pairs, [*ALPHAS, (0.05, 0.4)]):
-        shadow = masking(kind, name, alpha)
-        entry = distribution(name)
-
-        def value(light, view, entry=entry, alpha=alpha, shadow=shadow):
-            return reflection(light, view, entry, alpha, shadow)
-
-        yield f"{name}-{kind}-{alpha}", value
+        facets = surface(name, alpha)
+        yield f"{name}-{kind}-{alpha}", microfacet(facets, lossless, MASKINGS[kind](facets))
     for alpha in ALPHAS:
-        yield f"smoothie-{alpha}", lambda light, view, a=alpha: exact(light, view, a)
-        yield f"smoothie-approx-{alpha}", lambda light, view, a=alpha: approximate(light, view, a)
+        yield f"smoothie-{alpha}", smoothie(surface("smoothie", alpha), lossless)
+        yield f"smoothie-approx-{alpha}", smoothie_approx(surface("smoothie", alpha), lossless)
     for exponent in (0.0, 1.0, 300.0):
-        yield f"phong-{exponent}", lambda light, view, n=exponent: modified(light, view, n)
+        yield f"phong-{exponent}", modified(exponent)
         if exponent:
-            entry = distribution("ashikhmin-shirley")
-            yield (
-                f"ashikhmin-shirley-{exponent}",
-                lambda light, view, n=exponent, e=entry: ashikhmin_shirley(light, view, e, n),
-            )
+            facets = surface("ashikhmin-shirley", exponent)
+            yield f"ashikhmin-shirley-{exponent}", ashikhmin_shirley(facets, lossless)
 
 
 BRDFS = dict(brdfs())
@@ -141,7 +138,8 @@ def test_masking_is_between_0_and_1_and_separable_the_smaller():
     light, view = hemisphere(300), hemisphere(300)
     m = half_vector(light, view)
     for name, alpha in itertools.product(["ggx", "beckmann"], ALPHAS):
-        values = {kind: masking(kind, name, alpha)(light, view, m) for kind in MASKINGS}
+        facets = surface(name, alpha)
+        values = {kind: MASKINGS[kind](facets)(light, view, m) for kind in MASKINGS.names}
         for kind in ("correlated", "separable", "v-cavity", "none"):
             assert ((values[kind] >= 0) & (values[kind] <= 1)).all()
         assert (values["separable"] <= values["correlated"] * (1 + 1e-15)).all()
@@ -149,14 +147,55 @@ def test_masking_is_between_0_and_1_and_separable_the_smaller():
 
 def test_a_facet_seen_from_behind_is_masked():
     omega, m = direction(0.3), direction(2.0, np.pi)
-    assert smith_g1("ggx", omega, m, 0.2) == 0
-    assert smith_g1("ggx", omega, direction(0.1), 0.2) > 0.9
+    assert surface("ggx", 0.2).smith_g1(omega, m) == 0
+    assert surface("ggx", 0.2).smith_g1(omega, direction(0.1)) > 0.9
+
+
+@pytest.mark.parametrize("name", ["smoothie", "gtr", "student-t"])
+def test_a_distribution_that_is_another_has_its_masking(name):
+    """Smoothie is GGX with α/√(4+α²); GTR and Student-t are GGX at their default γ of 2."""
+    alpha = 0.6
+    ggx = alpha / np.sqrt(4 + alpha**2) if name == "smoothie" else alpha
+    omega = hemisphere(50)
+    expected = surface("ggx", ggx).smith_lambda(omega)
+    assert surface(name, alpha).smith_lambda(omega) == pytest.approx(expected, rel=1e-14)
+    assert surface(name, alpha).has_visible_normals
+
+
+@pytest.mark.parametrize("name", [entry.name for entry in list_distributions() if entry.smith])
+def test_masking_of_every_distribution_that_declares_it(name):
+    """Heitz's identity as above, for whatever distribution says that its Λ is known."""
+    parameter = distribution(name).parameter.typical_value
+    omega = direction(1.2)
+    m, weight = slopes(omega, parameter)
+    facets = surface(name, parameter)
+    value = facets.density(m) * np.maximum(dot(omega, m), 0) * weight
+    assert float(value.sum() / (1 + facets.smith_lambda(omega))) == pytest.approx(
+        omega[2], abs=1e-8
+    )
+
+
+def test_masking_does_not_depend_on_the_form_of_d():
+    light, view = direction(0.4), direction(1.1, 2.0)
+    m = half_vector(light, view)
+    unit_form = Microsurface(distribution("beckmann"), 0.3, normalized=False)
+    normalized = surface("beckmann", 0.3)
+    assert unit_form.correlated(light, view, m) == normalized.correlated(light, view, m)
+    assert unit_form.half_vector_density(m) == normalized.half_vector_density(m)
+    assert unit_form.density(m) == pytest.approx(normalized.density(m) * np.pi * 0.3**2)
 
 
 def test_mistakes():
-    with pytest.raises(MdfconvError, match="unknown Smith masking 'gauss'"):
-        masking("correlated", "gauss", 0.1)
+    for name in ("gauss", "gtr"):
+        other = Microsurface(
+            distribution(name).with_gamma(3.0) if name == "gtr" else distribution(name), 0.1
+        )
+        with pytest.raises(MdfconvError, match=f"{name}.* has no closed form of Smith's masking"):
+            MASKINGS["correlated"](other)(direction(0.1), direction(0.1), direction(0.0))
     with pytest.raises(MdfconvError, match="unknown masking 'smith'"):
-        masking("smith", "ggx", 0.1)
-    with pytest.raises(MdfconvError, match="a roughness is above 0"):
-        smith_lambda("ggx", direction(0.1), 0.0)
+        MASKINGS["smith"]
+    with pytest.raises(MdfconvError, match="outside the legal range"):
+        surface("ggx", 0.0)
+    with pytest.raises(MdfconvError, match="outside the legal range"):
+        surface("ggx", (0.1, 0.0))
+    assert MASKINGS["V_Cavity"](surface("gauss", 0.1)) is v_cavity

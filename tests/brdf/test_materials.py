@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
-import mdfconv
+from mdfconv.brdf.directions import direction, frames
+from mdfconv.brdf.fresnel import lossless
+from mdfconv.brdf.masking import kelemen_szirmay_kalos
 from mdfconv.brdf.materials import METALS, PLASTICS, list_materials, material
-from mdfconv.brdf.reflection import BRDFS, Geometry
+from mdfconv.brdf.microsurface import Microsurface
+from mdfconv.brdf.phong import modified
+from mdfconv.brdf.reflection import BRDFS, microfacet
+from mdfconv.distributions import distribution
 from mdfconv.errors import MdfconvError
 
 LIGHT = np.array([-0.6, 0.3, np.sqrt(1 - 0.45)])
@@ -19,13 +24,12 @@ def lit_normals(count=400):
     return normals[(normals @ LIGHT > 0) & (normals @ VIEW > 0)]
 
 
-def evaluate(brdf, name, parameter, fresnel=lambda cosine: 1.0):
+def evaluate(brdf, name, parameter, fresnel=lossless):
+    """Return normals, and the BRDF for one light and viewer as they meet them."""
     normals = lit_normals()
-    entry = mdfconv.distribution(name)
-    found = BRDFS[brdf](
-        lambda angle: entry.normalized(angle, parameter), fresnel, Geometry(normals, LIGHT, VIEW)
-    )
-    return normals, found
+    local = frames(normals)
+    surface = Microsurface(distribution(name), parameter)
+    return normals, BRDFS[brdf](surface, fresnel)(local @ LIGHT, local @ VIEW)
 
 
 def test_metals_start_at_their_color_and_end_at_white():
@@ -80,21 +84,31 @@ def test_any_distribution_around_the_mirror_direction_reflects_all_energy(name, 
     """To a viewer along the normal: quadrature over directions of light."""
     nodes, weights = np.polynomial.legendre.leggauss(400)
     theta = 0.25 * np.pi * (nodes + 1)
-    normal = np.array([[0.0, 0.0, 1.0]])
-    entry = mdfconv.distribution(name)
-    total = 0.0
-    for angle, weight in zip(theta, weights, strict=True):
-        light = np.array([np.sin(angle), 0, np.cos(angle)])
-        value = BRDFS["modified-phong"](
-            lambda beta: entry.normalized(beta, parameter),
-            lambda cosine: 1.0,
-            Geometry(normal, light, normal[0]),
-        )
-        total += 0.25 * np.pi * weight * 2 * np.pi * value[0] * np.cos(angle) * np.sin(angle)
-    assert total == pytest.approx(1, rel=1e-9)
+    light, view = direction(theta), np.broadcast_to([0.0, 0.0, 1.0], (theta.size, 3))
+    brdf = BRDFS["modified-phong"](Microsurface(distribution(name), parameter), lossless)
+    ring = 2 * np.pi * np.sin(theta) * np.cos(theta) * 0.25 * np.pi * weights
+    assert np.sum(brdf(light, view) * ring) == pytest.approx(1, rel=1e-9)
 
 
-@pytest.mark.parametrize("brdf", BRDFS)
+def test_one_definition_serves_pictures_and_the_furnace():
+    """Smoothie is the microfacet BRDF under its masking, modified Phong that around the mirror."""
+    local = frames(lit_normals())
+    light, view = local @ LIGHT, local @ VIEW
+    surface = Microsurface(distribution("smoothie"), 0.3)
+    np.testing.assert_allclose(
+        BRDFS["smoothie"](surface, lossless)(light, view),
+        microfacet(surface, lossless, kelemen_szirmay_kalos)(light, view),
+        rtol=1e-13,
+    )
+    surface = Microsurface(distribution("blinn-phong"), 20.0)
+    np.testing.assert_allclose(
+        BRDFS["modified-phong"](surface, lossless)(light, view),
+        modified(20.0)(light, view),
+        rtol=1e-11,
+    )
+
+
+@pytest.mark.parametrize("brdf", BRDFS.names)
 def test_a_metal_scales_the_channels(brdf):
     _, grey = evaluate(brdf, "ggx", 0.3)
     normals, colored = evaluate(brdf, "ggx", 0.3, material("copper").fresnel)

@@ -72,6 +72,7 @@ def test_all_targets():
         "schlick": "0.2",
         "sawicki": "56.065",
         "smoothie": "0.4846741243",
+        "student-t": "0.23552",
     }
     assert err == ""
     status, out, err = run("convert", "--from", "beckmann", "--to", "all", 0.9)
@@ -96,7 +97,7 @@ def test_fit_and_metric():
         *arguments, "--metric", "display", "--exposure", 4, "--format", "json", 100
     )
     (record,) = json.loads(out)
-    assert record["metric"] == "display"
+    assert record["metric"] == "display:4"
     assert record["notes"][0] == "keeps the picture on a screen"
 
 
@@ -105,7 +106,22 @@ def test_gamma():
     status, out, _ = run(*arguments, "--method", "half-angle")
     assert status == 0
     assert float(out) == pytest.approx(0.2495316462)
-    assert run(*arguments)[0] == 2
+    # Without a method it is the fit, as there is no closed form; one that is asked for has none.
+    status, out, _ = run(*arguments)
+    assert (status, float(out)) == (0, pytest.approx(mdfconv.convert(0.2, "ggx", "gtr", gamma=3)))
+    assert run(*arguments, "--method", "closed-form")[0] == 2
+
+
+def test_both_parameters_are_fitted_and_printed():
+    arguments = ("convert", "--from", "beckmann", "--to", "student-t", "--gamma", "free", "0.2")
+    status, out, err = run(*arguments)
+    assert (status, out) == (0, "0.2000661683 512\n")
+    assert err == (
+        "mdfconv: note: γ of student-t is at the end of the range in which it is looked for, "
+        "2 to 512\n"
+    )
+    (record,) = json.loads(run(*arguments, "--format", "json")[1])
+    assert (record["gamma"], record["method"]) == (512, "fit")
 
 
 def test_table_on_a_terminal():
@@ -148,6 +164,17 @@ def test_table_in_a_pipe_has_no_escapes():
         (("--from", "beckmann", "--to", "phong", "0.9"), "half-angle answers"),
         (("--from", "beckmann", "--to", "ggx", "--method", "wart", "0.2"), "did you mean ward"),
         (("--from", "ggx", "--to", "gtr", "--gamma", "-1", "0.2"), "γ > 0"),
+        (("--from", "ggx", "--to", "gtr", "--gamma", "wide", "0.2"), "a number or free"),
+        (("--from", "ggx", "--to", "gauss", "--gamma", "3", "0.2"), "neither ggx nor gauss has"),
+        (("--from", "gtr", "--to", "ggx", "--gamma", "free", "0.2"), "ggx has one parameter"),
+        (
+            ("--from", "ggx", "--to", "gtr", "--gamma", "free", "--method", "peak", "0.2"),
+            "peak takes γ as it is; fit finds it",
+        ),
+        (
+            ("--from", "beckmann", "--to", "ggx", "--metric", "unit", "--exposure", "2", "0.2"),
+            "the unit metric has no exposure",
+        ),
         (("--from", "beckmann", "--to", "ggx", "-"), "holds no values"),
         (("--from", "beckmann", "--to", "ggx", "-", "-"), "only once"),
         (("--form", "beckmann", "--to", "ggx", "1"), "no such option: --form"),

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 import mdfconv
 from mdfconv.conversion import fast
-from mdfconv.conversion.residual import residual
-from mdfconv.fitting.core import fit
-from mdfconv.fitting.metrics import list_metrics, metric
+from mdfconv.conversion.remaining_error import remaining_error
+from mdfconv.fitting.fit import fit
+from mdfconv.fitting.metrics import list_metrics, metric_named
 from tests import generate_fast
 from tests.cli.runner import run
 
@@ -35,7 +35,7 @@ def test_fast_is_the_fit(source, target, kept):
         warnings.simplefilter("ignore", mdfconv.MdfconvWarning)
         got = mdfconv.convert(values, source, target, "fast", metric=kept)
     sides = mdfconv.distribution(source), mdfconv.distribution(target)
-    exact = fit(sides[0], values, sides[1], metric(kept)).parameter
+    exact = fit(sides[0], values, sides[1], metric_named(kept)).parameter
     answered = np.isfinite(got)
     assert got[answered] == pytest.approx(exact[answered], rel=LIMIT[kept])
     # What is left out are sources rougher than any Sawicki lobe that anyone would use.
@@ -54,7 +54,7 @@ def test_stored_errors_are_those_of_the_conversion(pair, kept):
     sides = [mdfconv.distribution(name) for name in pair]
     found = mdfconv.explain(values, *pair, "fast", metric=kept)
     result = np.array([entry.result for entry in found])
-    rmse, largest = residual(sides[0], values, sides[1], result, metric(kept))
+    rmse, largest = remaining_error(sides[0], values, sides[1], result, metric_named(kept))
     # The stored errors are those of the fit, from which the parameter may differ in the 5th digit.
     assert [entry.rmse for entry in found] == pytest.approx(rmse, rel=0.02, abs=2e-5)
     assert [entry.max_error for entry in found] == pytest.approx(largest, rel=0.02, abs=2e-5)
@@ -97,8 +97,8 @@ def test_exact_pairs_and_other_names():
     assert direct == mdfconv.convert(0.3, "ggx", "beckmann", method="fast")
     with pytest.raises(mdfconv.MdfconvError, match=r"fast has no conversion from gtr \(γ = 3\)"):
         mdfconv.convert(0.3, "gtr", "beckmann", method="fast", gamma=3)
-    with pytest.raises(mdfconv.MdfconvError, match="display metric at exposure 1 only; use fit"):
-        mdfconv.convert(0.3, "ggx", "beckmann", method="fast", metric="display", exposure=2)
+    with pytest.raises(mdfconv.MdfconvError, match="stored under the display:2 metric; use fit"):
+        mdfconv.convert(0.3, "ggx", "beckmann", method="fast", metric="display:2")
 
 
 def test_what_is_covered_is_said():

@@ -75,7 +75,7 @@ def test_the_papers_figures():
 def test_gtr_with_gamma_two_is_ggx_and_others_have_no_closed_form():
     assert mdfconv.convert(0.2, "beckmann", "gtr") == mdfconv.convert(0.2, "beckmann", "ggx")
     with pytest.raises(ValueError, match=r"gtr \(γ = 3\); use half-angle or peak"):
-        mdfconv.convert(0.2, "beckmann", "gtr", gamma=3)
+        mdfconv.convert(0.2, "beckmann", "gtr", "closed-form", gamma=3)
     alpha = mdfconv.convert(0.2, "beckmann", "gtr", method="half-angle", gamma=3)
     beta = mdfconv.distribution("beckmann").half_width(0.2)
     assert mdfconv.distribution("gtr").unit(beta, alpha, gamma=3) == pytest.approx(0.5)

@@ -8,85 +8,49 @@ from hypothesis import strategies as st
 
 import mdfconv
 from tests import oracles
+from tests.distributions.cases import ENTRIES, HALF_PI, INSTANCES, angles, parameters
 
-SMOOTH = [1e-8, 1e-6, 1e-4, 1e-3, 0.01]
-ROUGH = [0.05, 0.2, 0.5, 0.7, 0.70710678, 0.71, 0.9, 0.999, 1.0]
-EXPONENTS = [1e-3, 0.5, 1, 1.5, 2, 7.3, 100, 1e4, 1e8, 1e12, 1e16]
-PARAMETERS = {
-    "beckmann": [*SMOOTH, *ROUGH, 1.5, 3, 100, 1e5],
-    "gauss": [*SMOOTH, *ROUGH, 1.5, 3, 100, 1e5],
-    "ggx": [*SMOOTH, *ROUGH],
-    "gtr": [*SMOOTH, *ROUGH],
-    "schlick": [*SMOOTH, *ROUGH],
-    "smoothie": [*SMOOTH, *ROUGH, 1.5, 3, 100, 1e5],
-    "blinn-phong": EXPONENTS,
-    "sawicki": EXPONENTS,
-}
 LIMITS = {np.float64: (5e-12, 1e-280), np.float32: (1e-4, 1e-30)}
-HALF_PI = np.pi / 2
-
-
-def angles(name, parameter):
-    """Angles through the lobe, into its tail, and to both ends of the range."""
-    width = mdfconv.distribution(name).half_width(parameter)
-    width = 0.5 if np.isnan(width) else width
-    fixed = [0, 1e-300, 1e-30, 1e-8, 1e-3, HALF_PI - 1e-3, HALF_PI - 1e-8, HALF_PI]
-    beta = [fixed, width * np.logspace(-2, 3, 30), np.linspace(0, HALF_PI, 9)]
-    if name == "schlick":
-        edge = 2 * np.arcsin(np.sqrt(parameter / 2))
-        near = np.logspace(-15, -1, 15)
-        beta += [edge * (1 - near), edge * (1 + near), [edge, np.nextafter(edge, 0)]]
-    return np.minimum(np.concatenate(beta), HALF_PI)
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize("name", PARAMETERS)
-@pytest.mark.parametrize("gamma", [2])
-def test_unit_form_at_fifty_digits(name, dtype, gamma):
-    check_against_oracle(name, dtype, gamma)
-
-
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize("gamma", [0.3, 1, 1.5, 10])
-def test_gtr_at_fifty_digits(dtype, gamma):
-    check_against_oracle("gtr", dtype, gamma)
-
-
-def check_against_oracle(name, dtype, gamma):
+@pytest.mark.parametrize("label", INSTANCES)
+def test_unit_form_at_fifty_digits(label, dtype):
     tolerance, floor = LIMITS[dtype]
-    entry = mdfconv.distribution(name)
-    options = {"gamma": dtype(gamma)} if name == "gtr" else {}
-    for parameter in map(dtype, PARAMETERS[name]):
-        beta = angles(name, float(parameter)).astype(dtype)
-        value = entry.unit(beta, parameter, **options)
-        assert value.dtype == dtype
-        assert np.all(value >= 0)
-        assert np.all(value <= 1 + 4 * np.finfo(dtype).eps)
-        for angle, got in zip(beta, value, strict=True):
+    entry = INSTANCES[label]
+    options = {} if entry.gamma is None else {"gamma": dtype(entry.gamma)}
+    for parameter in parameters(entry, dtype):
+        beta = angles(entry, float(parameter)).astype(dtype)
+        values = entry.unit(beta, parameter, **options)
+        assert values.dtype == dtype
+        assert np.all(values >= 0)
+        assert np.all(values <= 1 + 4 * np.finfo(dtype).eps)
+        for angle, value in zip(beta, values, strict=True):
             if float(angle) > HALF_PI:
                 # float32's π/2 lies beyond π/2, where the power of a cosine has no meaning.
                 continue
-            exact = oracles.unit(name, angle, parameter, options.get("gamma", 2))
+            exact = oracles.unit(entry.name, angle, parameter, options.get("gamma", 2))
             if exact > floor:
-                assert oracles.relative_error(got, exact) <= tolerance, (parameter, angle)
+                assert oracles.relative_error(value, exact) <= tolerance, (parameter, angle)
 
 
-@pytest.mark.parametrize("name", PARAMETERS)
-def test_single_precision_half_pi_is_the_limit(name):
-    entry = mdfconv.distribution(name)
+@pytest.mark.parametrize("label", INSTANCES)
+def test_single_precision_half_pi_is_the_limit(label):
+    entry = INSTANCES[label]
     beta = np.float32(HALF_PI)
-    for parameter in PARAMETERS[name]:
-        got = entry.unit(beta, parameter)
-        limit = entry.unit(HALF_PI, parameter)
-        if parameter >= 1 or name not in ("blinn-phong", "sawicki"):
-            np.testing.assert_allclose(got, limit, rtol=1e-3, atol=1e-7)
-        assert np.isfinite(got)
+    for parameter in parameters(entry):
+        value = entry.unit(beta, parameter)
+        # As far beyond the horizon as the mirrored angle lies before it.
+        limit = entry.unit(np.pi - float(beta), parameter)
+        if parameter >= 1 or not entry.parameter.larger_is_smoother:
+            np.testing.assert_allclose(value, limit, rtol=1e-3, atol=1e-7)
+        assert np.isfinite(value)
 
 
-@pytest.mark.parametrize("name", PARAMETERS)
-def test_parameters_broadcast_against_angles(name):
-    entry = mdfconv.distribution(name)
-    parameter = np.asarray(PARAMETERS[name], dtype=float)
+@pytest.mark.parametrize("label", INSTANCES)
+def test_parameters_broadcast_against_angles(label):
+    entry = INSTANCES[label]
+    parameter = np.asarray(parameters(entry))
     beta = np.linspace(0, HALF_PI, 100)
     grid = entry.unit(beta[:, None], parameter)
     assert grid.shape == (100, parameter.size)
@@ -94,6 +58,19 @@ def test_parameters_broadcast_against_angles(name):
         np.testing.assert_allclose(column, entry.unit(beta, value), rtol=1e-13)
     # One angle for many parameters.
     np.testing.assert_allclose(entry.unit(0.1, parameter), entry.unit(beta[:1] + 0.1, parameter))
+
+
+@pytest.mark.parametrize("name", [n for n, entry in ENTRIES.items() if entry.second_parameter])
+def test_a_second_parameter_broadcasts_too(name):
+    entry = ENTRIES[name]
+    gamma = np.array([2.0, 2.5, 7.0])
+    beta = np.linspace(0, HALF_PI, 100)[:, None]
+    for form in ("unit", "normalized"):
+        together = getattr(entry, form)(beta, 0.3, gamma=gamma)
+        for column, value in zip(together.T, gamma, strict=True):
+            alone = getattr(entry.with_gamma(value), form)(beta[:, 0], 0.3)
+            np.testing.assert_allclose(column, alone, rtol=1e-13)
+    assert entry.unit(np.float32(0.1), 0.3, gamma=np.float32(3)).dtype == np.float32
 
 
 def test_shapes_and_types():
@@ -130,14 +107,13 @@ def test_facets_below_the_horizon_do_not_count():
 
 
 @given(
-    st.sampled_from(sorted(PARAMETERS)),
+    st.sampled_from(sorted(INSTANCES)),
     st.floats(0, HALF_PI),
     st.floats(1e-12, 1),
 )
-def test_unit_form_stays_in_the_unit_interval(name, beta, parameter):
-    if name in ("blinn-phong", "sawicki"):
-        parameter = 1 / parameter
-    value = mdfconv.distribution(name).unit(beta, parameter)
+def test_unit_form_stays_in_the_unit_interval(label, beta, parameter):
+    entry = INSTANCES[label]
+    value = entry.unit(beta, 1 / parameter if entry.parameter.larger_is_smoother else parameter)
     assert 0 <= value <= 1 + 1e-15
 
 

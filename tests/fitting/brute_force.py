@@ -4,101 +4,163 @@ The minimum is where the squared distances at p(1+h) and p(1−h) are equal, whi
 derivative. Normalizing constants come from the same trapezoid rule, not from closed forms.
 """
 
+from itertools import pairwise
+
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 FORMS = {
-    "beckmann": lambda b, m: np.exp(-((np.tan(b) / m) ** 2)) / np.cos(b) ** 4,
-    "gauss": lambda b, m: np.exp(-((b / m) ** 2)),
-    "ggx": lambda b, a: (a**2 / (a**2 + (1 - a**2) * np.sin(b) ** 2)) ** 2,
-    "blinn-phong": lambda b, n: np.cos(b) ** n,
-    "sawicki": lambda b, n: 256 * np.cos(b) / ((1 - n) * np.cos(b) + n + 3) ** 4,
-    "schlick": lambda b, m: schlick(np.cos(b), m),
-    "smoothie": lambda b, a: (a**2 / (a**2 + 4 * np.sin(b) ** 2)) ** 2,
+    "beckmann": lambda at, m: np.exp(at.tan2 / -(m**2)) / at.cos4,
+    "gauss": lambda at, m: np.exp(at.beta2 / -(m**2)),
+    "ggx": lambda at, a: (a**2 / (a**2 + (1 - a**2) * at.sin2)) ** 2,
+    "blinn-phong": lambda at, n: np.exp(n * at.log_cos),
+    "sawicki": lambda at, n: 256 * at.cos / (4 + (n - 1) * at.versine) ** 4,
+    "schlick": lambda at, m: schlick(at.cos, m),
+    "smoothie": lambda at, a: (a**2 / (a**2 + 4 * at.sin2)) ** 2,
 }
+HORIZON = np.pi / 2 * (1 - 1e-15)
+COARSE, FINE = 300, 600
+STEP = 1e-5
+# The sRGB curve has a corner at the end of its straight piece, and one where it is clipped.
+STRAIGHT, WHITE = 0.0031308, 1.0
 
 
 def schlick(c, m):
-    x = np.maximum(c + m - 1, 0)
-    bottom = np.where(x > 0, c * (m * x**2 - x**2 + m**2) ** 2, 1)
+    x = np.maximum(c + (m - 1), 0)
+    bottom = np.where(x > 0, c * ((m - 1) * x**2 + m**2) ** 2, 1)
     return m**5 * x / bottom
 
 
 def srgb(x):
-    x = np.clip(x, 0, 1)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+    x = np.minimum(x, WHITE)
+    return np.where(x <= STRAIGHT, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
 
 
-def highest(form):
-    """Return the maximum, between samples by a parabola."""
-    place = int(np.argmax(form))
-    if place in (0, len(form) - 1):
-        return form[place]
-    before, top, after = form[place - 1 : place + 2]
-    return top - (after - before) ** 2 / (8 * (after - 2 * top + before))
+class Angles:
+    """Angles β and what the forms take of them."""
+
+    def __init__(self, beta):
+        self.beta, self.beta2 = beta, beta**2
+        self.cos, self.sin2 = np.cos(beta), np.sin(beta) ** 2
+        self.versine = 2 * np.sin(beta / 2) ** 2
+        self.tan2, self.cos4 = self.sin2 / self.cos**2, self.cos**4
+        self.log_cos = np.log(self.cos)
 
 
-class Grid:
-    """A trapezoid rule in z with β = w (e^u − 1), u = U (1 − (1−z)³).
+class Grid(Angles):
+    """A trapezoid rule in s on each piece between corners of the integrand.
 
-    Fine at the lobe, and at the horizon, where small powers of cos β are steep.
+    On a piece from a, β = a + w (e^u − 1), u = U (1 − (1−z)³), z = s³ (10 − 15 s + 6 s²): fine at
+    the lobe, and at the horizon, where small powers of cos β are steep. At both ends the weights
+    vanish with their slopes, so that few points give many digits.
     """
 
-    def __init__(self, width, count):
-        z = np.linspace(0, 1, count)
-        top = np.log1p(np.pi / 2 / width)
-        u = top * (1 - (1 - z) ** 3)
-        self.beta = np.minimum(width * np.expm1(u), np.pi / 2 * (1 - 1e-15))
-        self.weight = (self.beta + width) * 3 * top * (1 - z) ** 2 * z[1]
-        self.weight[[0, -1]] *= 0.5
+    def __init__(self, width, count, corners):
+        s = np.linspace(0, 1, count)
+        z = s**3 * (10 - 15 * s + 6 * s**2)
+        slope = 30 * (s * (1 - s)) ** 2 * s[1]
+        beta, weight = [], []
+        for start, end in pairwise(np.unique([0, *corners, HORIZON])):
+            top = np.log1p((end - start) / width)
+            piece = width * np.expm1(top * (1 - (1 - z) ** 3))
+            beta.append(np.minimum(start + piece, end))
+            weight.append((piece + width) * 3 * top * (1 - z) ** 2 * slope)
+        super().__init__(np.concatenate(beta))
+        self.weight = np.concatenate(weight)
+        self.energy = self.weight * np.pi * np.sin(2 * self.beta)
+
+
+class Lobe:
+    """A distribution with a parameter, or with a column of parameters."""
+
+    def __init__(self, name, parameter):
+        self.name, self.parameter = name, parameter
+
+    def form(self, angles):
+        return FORMS[self.name](angles, self.parameter)
+
+    def corners(self):
+        """Return the angles at which the form bends."""
+        return [np.arccos(max(1 - self.parameter, 0))] if self.name == "schlick" else []
+
+    def highest(self, grid):
+        """Return the form's maximum, refined between points if it is not at an end."""
+        form = self.form(grid)
+        top = np.argmax(form)
+        if top in (0, len(form) - 1):
+            return form[top]
+        return -minimize_scalar(
+            lambda beta: -self.form(Angles(beta)),
+            bounds=(grid.beta[top - 1], grid.beta[top + 1]),
+            method="bounded",
+            options={"xatol": 1e-8},
+        ).fun
+
+    def crossings(self, level, grid):
+        """Return the angles at which the form passes a level."""
+        for cell in np.flatnonzero(np.diff(self.form(grid) > level)):
+            around = Angles(np.linspace(grid.beta[cell], grid.beta[cell + 1], 50))
+            form = self.form(around)
+            order = np.argsort(form)
+            yield np.interp(level, form[order], around.beta[order])
 
 
 class Problem:
-    def __init__(self, metric, source, parameter, target, width, count):
-        self.metric, self.target = metric, target
-        self.grid = Grid(0.05 * width, count)
-        self.energy = self.grid.weight * np.pi * np.sin(2 * self.grid.beta)
-        form = FORMS[source](self.grid.beta, parameter)
-        if metric == "unit":
-            self.weight, self.peak = self.grid.weight, highest(form)
-        else:
-            self.weight, self.peak = self.energy, highest(form) / np.sum(self.energy * form)
-        self.source = self.signal(form)
+    def __init__(self, metric, source, parameter, target, width):
+        self.metric, self.source, self.target = metric, Lobe(source, parameter), target
+        self.width = 0.05 * width
+        # Only Schlick's corner and the screen's make a grid depend on the target.
+        self.fixed = Grid(self.width, FINE, self.source.corners())
+        form = self.source.form(self.fixed)
+        self.white = self.source.highest(self.fixed) / np.sum(self.fixed.energy * form)
 
-    def signal(self, form):
-        form = form / (highest(form) if self.metric == "unit" else np.sum(self.energy * form))
-        if self.metric == "unit":
-            return form
-        return srgb(form / self.peak) if self.metric == "display" else form / self.peak
+    def distances(self, parameters):
+        """Return the distances from the source to many targets, on a coarse grid."""
+        grid = Grid(self.width, COARSE, self.source.corners())
+        source, targets = (
+            self.signal(form, form.max(axis=-1, keepdims=True), grid)
+            for form in (self.source.form(grid), Lobe(self.target, parameters[:, None]).form(grid))
+        )
+        return (targets - source) ** 2 @ self.weight(grid)
 
-    def at(self, parameter):
-        return self.signal(FORMS[self.target](self.grid.beta, parameter))
-
-    def distance(self, parameter):
-        return np.sum(self.weight * (self.at(parameter) - self.source) ** 2)
-
-    def imbalance(self, log_parameter, step):
+    def imbalance(self, log_parameter):
         """Return the distance at p(1+h) less that at p(1−h), without cancellation."""
-        above, below = (self.at(np.exp(log_parameter + sign * step)) for sign in (1, -1))
-        return np.sum(self.weight * (above - below) * (above + below - 2 * self.source))
+        above, below = (Lobe(self.target, np.exp(log_parameter + step)) for step in (STEP, -STEP))
+        lobes = above, below, self.source
+        grid = self.grid(lobes)
+        above, below, source = (
+            self.signal(lobe.form(grid), lobe.highest(grid), grid) for lobe in lobes
+        )
+        return np.sum(self.weight(grid) * (above - below) * (above + below - 2 * source))
+
+    def signal(self, form, highest, grid):
+        if self.metric == "unit":
+            return form / highest
+        light = form / (self.white * np.sum(grid.energy * form, axis=-1, keepdims=True))
+        return srgb(light) if self.metric == "display" else light
+
+    def weight(self, grid):
+        return grid.weight if self.metric == "unit" else grid.energy
+
+    def grid(self, lobes):
+        """Return a fine grid with a piece between any two corners of the lobes' signals."""
+        corners = [corner for lobe in lobes for corner in lobe.corners()]
+        grid = Grid(self.width, FINE, corners) if self.target == "schlick" else self.fixed
+        if self.metric != "display":
+            return grid
+        for lobe in lobes:
+            white = self.white * np.sum(grid.energy * lobe.form(grid))
+            for level in (STRAIGHT, WHITE):
+                corners += lobe.crossings(level * white, grid)
+        return Grid(self.width, FINE, corners)
 
 
 def minimum(metric, source, parameter, target, width, candidates):
     """Return the global minimum among candidates, refined; NaN if it is the lowest candidate."""
-    coarse = Problem(metric, source, parameter, target, width, 1500)
-    costs = [coarse.distance(candidate) for candidate in candidates]
-    place = int(np.argmin(costs))
-    if place == 0:
+    problem = Problem(metric, source, parameter, target, width)
+    lowest = int(np.argmin(problem.distances(candidates)))
+    if lowest == 0:
         return np.nan
-    assert place < len(candidates) - 1, "the scan must hold the minimum inside"
-    # The trapezoid rule sees the edge of Schlick's support as a kink, which takes more points.
-    kinked = "schlick" in (source, target)
-    step = 1.5e-4
-    count = 150_000 if metric == "display" or width > 0.8 else 50_000
-    if kinked:
-        count = 350_000 if width > 0.3 else 100_000
-    if kinked and width > 0.8:
-        count, step = 1_000_000, 2e-5
-    fine = Problem(metric, source, parameter, target, width, count)
-    ends = np.log([candidates[place - 1], candidates[place + 1]])
-    return np.exp(brentq(fine.imbalance, *ends, (step,), xtol=2e-9, rtol=1e-13))
+    assert lowest < len(candidates) - 1, "the scan must hold the minimum inside"
+    ends = np.log([candidates[lowest - 1], candidates[lowest + 1]])
+    return np.exp(brentq(problem.imbalance, *ends, xtol=2e-9, rtol=1e-13))

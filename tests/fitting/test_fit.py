@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 import mdfconv
-from mdfconv.distributions.gtr import GTR
-from mdfconv.fitting.core import fit
-from mdfconv.fitting.gtr import fit_gtr
-from mdfconv.fitting.metrics import Display, Energy, Unit, metric
+from mdfconv.distributions import one_parameter_distributions
+from mdfconv.fitting.fit import fit
+from mdfconv.fitting.free_gamma import fit_free_gamma
+from mdfconv.fitting.metrics import list_metrics, metric_named
+from mdfconv.fitting.metrics.display import Display
+from mdfconv.fitting.metrics.energy import Energy
+from mdfconv.fitting.metrics.unit import Unit
 from mdfconv.fitting.quadrature import UniformSamples
 from tests import oracles
 from tests.fitting import brute_force
@@ -23,7 +26,7 @@ PARAMETERS = {
     "sawicki": np.geomspace(1.2, 5e5, 12),
 }
 SCAN = np.geomspace(1 / 400, 12, 260)
-GAMMA = mp.mpf(1.7)
+GTR = type(mdfconv.distribution("gtr"))
 
 
 def candidates(target, guess):
@@ -37,11 +40,16 @@ def candidates(target, guess):
     return np.unique(np.concatenate([values[values < 0.7], near_one]))
 
 
-@pytest.mark.parametrize("kept", ["unit", "energy", "display"])
+def test_every_distribution_of_one_parameter_has_a_textbook_form():
+    names = [entry.name for entry in one_parameter_distributions() if not entry.second_parameter]
+    assert set(NAMES) == set(names)
+
+
+@pytest.mark.parametrize("kept", list_metrics())
 @pytest.mark.parametrize(("source", "target"), list(itertools.permutations(NAMES, 2)))
 def test_pair_against_brute_force(source, target, kept):
     entry = mdfconv.distribution(source)
-    found = fit(entry, PARAMETERS[source], mdfconv.distribution(target), metric(kept))
+    found = fit(entry, PARAMETERS[source], mdfconv.distribution(target), metric_named(kept))
     assert not found.at_limit.any()
     tolerance = 1e-5 if kept == "display" else 1e-7
     for parameter, got in zip(PARAMETERS[source], found.parameter, strict=True):
@@ -126,7 +134,7 @@ def test_fit_of_itself_is_itself():
     for name in NAMES:
         entry = mdfconv.distribution(name)
         for kept in ("unit", "energy", "display"):
-            found = fit(entry, PARAMETERS[name], entry, metric(kept)).parameter
+            found = fit(entry, PARAMETERS[name], entry, metric_named(kept)).parameter
             np.testing.assert_allclose(found, PARAMETERS[name], rtol=1e-8)
 
 
@@ -152,14 +160,16 @@ def test_gtr_with_fixed_gamma():
 
 
 def test_gtr_with_free_gamma():
-    alpha, gamma, distance = fit_gtr(GTR(3), np.array([0.2]), Energy())
-    assert alpha[0] == pytest.approx(0.2, rel=1e-4)
-    assert gamma[0] == pytest.approx(3, rel=1e-4)
-    assert abs(distance[0]) < 1e-12
+    found = fit_free_gamma(GTR(3), np.array([0.2]), GTR(), Energy())
+    assert found.parameter[0] == pytest.approx(0.2, rel=1e-4)
+    assert found.gamma[0] == pytest.approx(3, rel=1e-4)
+    assert abs(found.distance[0]) < 1e-12
+    assert not found.at_limit[0]
     # A Gaussian slope distribution is GTR's limit for γ → ∞.
-    assert fit_gtr(mdfconv.distribution("beckmann"), np.array([0.2]), Unit())[1][0] == (
-        pytest.approx(64)
-    )
+    limited = fit_free_gamma(mdfconv.distribution("beckmann"), np.array([0.2]), GTR(), Unit())
+    assert (limited.gamma[0], limited.at_limit[0]) == (64, True)
+    with pytest.raises(ValueError, match="ggx has one parameter"):
+        fit_free_gamma(GTR(3), np.array([0.2]), mdfconv.distribution("ggx"), Unit())
 
 
 def test_samples_are_used_as_they_are():
@@ -183,16 +193,21 @@ def test_samples_are_used_as_they_are():
 
 
 @pytest.mark.parametrize("normalized", [False, True])
-@pytest.mark.parametrize("name", [*NAMES, "gtr"])
-def test_slopes(name, normalized):
+@pytest.mark.parametrize("entry", one_parameter_distributions(), ids=lambda entry: entry.name)
+def test_slopes(entry, normalized):
     """The analytic slope against a difference quotient at 50 digits of precision."""
-    entry = GTR(1.7) if name == "gtr" else mdfconv.distribution(name)
-    values = [1.2, 30.0, 4e4] if name in ("blinn-phong", "sawicki") else [1e-3, 0.3, 0.69, 0.97]
+    name = entry.name
+    if entry.second_parameter:
+        entry = entry.with_gamma(1.17 * entry.second_parameter.typical[0])
+    gamma = 2 if entry.gamma is None else mp.mpf(entry.gamma)
+    falls = entry.parameter.larger_is_smoother
+    values = [1.2, 30.0, 4e4] if falls else [1e-3, 0.3, 0.69, 0.97]
     for parameter in values:
         width = entry.half_width(parameter)
         beta = np.array([[0, 0.3, 1, 2.2]]) * (0.4 if np.isnan(width) else width)
         beta = np.minimum(beta, 1.5)
         value, slope = entry.with_slope(beta, np.array([[parameter]]), normalized=normalized)
+        at_normal = slope_at_normal(entry, name, parameter, gamma) if normalized else 0
         step = mp.mpf(10) ** -20
         for place, angle in enumerate(beta[0]):
             if value[0, place] == 0:
@@ -200,21 +215,24 @@ def test_slopes(name, normalized):
                 continue
             above, below = (
                 oracles.ratio_mp(
-                    name, mp.mpf(angle), mp.mpf(parameter) * mp.exp(sign * step), GAMMA
+                    name, mp.mpf(angle), mp.mpf(parameter) * mp.exp(sign * step), gamma
                 )
                 for sign in (1, -1)
             )
             exact = (mp.log(above) - mp.log(below)) / (2 * step)
-            if not normalized and name == "beckmann" and parameter**2 > 0.5:
-                exact -= 4 - 2 / mp.mpf(parameter) ** 2
-            if normalized:
-                exact += slope_at_normal(entry, name, parameter)
+            if not normalized:
+                above, below = (
+                    oracles.maximum(name, mp.mpf(parameter) * mp.exp(sign * step), gamma)
+                    for sign in (1, -1)
+                )
+                exact -= (mp.log(above) - mp.log(below)) / (2 * step)
+            exact += at_normal
             assert slope[0, place] / value[0, place] == pytest.approx(
                 float(exact), rel=1e-9, abs=1e-9
             )
 
 
-def slope_at_normal(entry, name, parameter):
+def slope_at_normal(entry, name, parameter, gamma):
     """∂ ln D(0)/∂ ln p from a difference quotient of the hemisphere's integral."""
     step = mp.mpf(10) ** -12
 
@@ -226,7 +244,7 @@ def slope_at_normal(entry, name, parameter):
         else:
             edges = [e for e in edges if e < mp.pi / 2] + [mp.pi / 2]
         with mp.workdps(30):
-            return mp.quad(lambda b: oracles.ratio_mp(name, b, p, GAMMA) * mp.sin(2 * b), edges)
+            return mp.quad(lambda b: oracles.ratio_mp(name, b, p, gamma) * mp.sin(2 * b), edges)
 
     above, below = (integral(mp.mpf(parameter) * mp.exp(sign * step)) for sign in (1, -1))
     return -(mp.log(above) - mp.log(below)) / (2 * step)
@@ -238,12 +256,19 @@ def entry_width(entry, parameter):
 
 
 def test_metrics_are_named():
-    assert metric("Energy").name == "energy"
+    assert metric_named("Energy").name == "energy"
     with pytest.raises(ValueError, match="did you mean display"):
-        metric("displai")
-    for exposure in (0, -1, np.nan, np.inf):
+        metric_named("displai")
+    for exposure in (0, -1, np.nan, np.inf, "bright"):
         with pytest.raises(ValueError, match="exposure"):
-            metric("display", exposure)
+            metric_named(f"display:{exposure}")
+    with pytest.raises(ValueError, match="the energy metric has no setting '4'"):
+        metric_named("energy:4")
+    with pytest.raises(ValueError, match="named by a string"):
+        metric_named(4)
+    assert str(metric_named("display:4")) == "display:4"
+    assert str(metric_named("display:1")) == str(Display()) == "display"
+    assert metric_named(metric_named("display:0.5")).exposure == 0.5
 
 
 def test_convert_by_fit():
@@ -252,7 +277,7 @@ def test_convert_by_fit():
     energy = convert(100, "blinn-phong", "ggx:roughness", method="fit", metric="energy")
     assert energy == pytest.approx(0.36, abs=1e-4)
     values = np.array([[0.1, 0.2], [0.3, 0.4]])
-    got = convert(values, "beckmann", "ggx", method="fit", metric="display", exposure=4)
+    got = convert(values, "beckmann", "ggx", method="fit", metric="display:4")
     assert got.shape == (2, 2)
     assert np.all(np.diff(got.ravel()) > 0)
     with pytest.raises(ValueError, match="no answer in gauss"):

@@ -3,17 +3,23 @@
 import ctypes
 import itertools
 import math
+import re
 import shutil
 import subprocess
 
 import numpy as np
 import pytest
 
-from mdfconv.conversion.endpoint import endpoint
+from mdfconv.conversion.endpoint import Endpoint, endpoint, endpoints
+from mdfconv.distributions import list_distributions
+from mdfconv.distributions.parameter import Encoding, Parameter
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.core import fit
-from mdfconv.fitting.metrics import metric
-from mdfconv.formula import Problem, cheapest, pareto_front, write_formula
+from mdfconv.fitting.fit import fit
+from mdfconv.fitting.metrics import metric_named
+from mdfconv.formula import LANGUAGES, Problem, cheapest, pareto_front, write_formula
+from mdfconv.formula.family import Formula, Shape
+from mdfconv.formula.languages import argument_name
+from mdfconv.formula.search import is_glossy
 from tests.cli.runner import run
 
 # What the machine has: `.ci/run` installs both.
@@ -31,17 +37,17 @@ CASES = [
 
 
 @pytest.fixture(scope="module", params=CASES, ids=lambda case: f"{case[0]}-{case[1]}")
-def found(request):
-    source, target, kept, low, high, tolerance = request.param
-    problem = Problem(endpoint(source), endpoint(target), metric(kept), low, high)
+def solved(request):
+    source, target, metric, low, high, tolerance = request.param
+    problem = Problem(endpoint(source), endpoint(target), metric_named(metric), low, high)
     return problem, cheapest(problem, tolerance), tolerance
 
 
 def exact(problem, values):
     """Return stored values of the target by the fit, for float32 values of the source."""
-    given = problem.source.decode(values.astype(float))
+    parameter = problem.source.decode(values.astype(float))
     pair = problem.source.distribution, problem.target.distribution
-    return problem.target.encode(fit(pair[0], given, pair[1], problem.metric).parameter)
+    return problem.target.encode(fit(pair[0], parameter, pair[1], problem.metric).parameter)
 
 
 def values_in(problem):
@@ -49,24 +55,27 @@ def values_in(problem):
     return np.clip(values, np.float32(problem.low), np.float32(problem.high))
 
 
+@pytest.fixture(scope="module")
+def wanted(solved):
+    """The fit's answers at `values_in`."""
+    problem = solved[0]
+    return exact(problem, values_in(problem))
+
+
 def worst(problem, got, wanted):
     """Return the worst relative error, of 1 − g for a glossiness."""
-    encoding = problem.target.encoding
-    if encoding and encoding.name == "glossiness":
+    if problem.target.stored.name == "glossiness":
         got, wanted = 1 - got, 1 - wanted
     return np.max(np.abs(got / wanted - 1))
 
 
 def function_name(code):
-    return code.split("float ")[1].split("(")[0]
+    return re.search(r"^(?:float|def) (\w+)\(", code, re.M)[1]
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
-def test_c_compiles_runs_and_keeps_its_word(found, tmp_path, compiler):
-    problem, formula, tolerance = found
-    assert formula.error <= tolerance
-    code = write_formula(formula, problem, "c")
-    (tmp_path / "formula.c").write_text(code)
+def compiled(compiler, code, folder):
+    """Return a function of C as one of Python."""
+    (folder / "formula.c").write_text(code)
     flags = [
         "-Wall",
         "-Wextra",
@@ -78,48 +87,60 @@ def test_c_compiles_runs_and_keeps_its_word(found, tmp_path, compiler):
         "-fPIC",
     ]
     subprocess.run(
-        [compiler, *flags, "formula.c", "-o", "formula.so", "-lm"], cwd=tmp_path, check=True
+        [compiler, *flags, "formula.c", "-o", "formula.so", "-lm"], cwd=folder, check=True
     )
-    call = getattr(ctypes.CDLL(str(tmp_path / "formula.so")), function_name(code))
+    call = getattr(ctypes.CDLL(str(folder / "formula.so")), function_name(code))
     call.argtypes, call.restype = [ctypes.c_float], ctypes.c_float
+    return call
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_c_compiles_runs_and_keeps_its_word(solved, wanted, tmp_path, compiler):
+    problem, formula, tolerance = solved
+    assert formula.error <= tolerance
+    call = compiled(compiler, write_formula(formula, problem, "c"), tmp_path)
     values = values_in(problem)
     got = np.array([call(value) for value in values.tolist()])
-    assert worst(problem, got, exact(problem, values)) <= formula.error * 1.02 + 3e-7
+    assert worst(problem, got, wanted) <= formula.error * 1.02 + 3e-7
 
 
-def test_python_runs_on_numbers_and_arrays(found):
-    problem, formula, _ = found
+def test_python_runs_on_numbers_and_arrays(solved, wanted):
+    problem, formula, _ = solved
     code = write_formula(formula, problem, "python")
     scope = {}
     exec(code, scope)
-    function = scope[code.split("def ")[1].split("(")[0]]
+    function = scope[function_name(code)]
     values = values_in(problem)
     got = function(values.astype(float))
-    assert worst(problem, got, exact(problem, values)) <= formula.error * 1.02 + 3e-7
+    assert worst(problem, got, wanted) <= formula.error * 1.02 + 3e-7
     assert function(float(values[5])) == pytest.approx(got[5], rel=1e-12)
 
 
 @pytest.mark.parametrize("validator", VALIDATORS)
-def test_shaders_validate(found, tmp_path, validator):
-    problem, formula, _ = found
+def test_shaders_validate(solved, tmp_path, validator):
+    problem, formula, _ = solved
+    validate(validator, problem, formula, tmp_path)
+
+
+def validate(validator, problem, formula, folder):
     glsl = write_formula(formula, problem, "glsl")
     name = function_name(glsl)
     source = f"#version 310 es\nprecision highp float;\n{glsl}\nlayout(location = 0) in float x;\n"
     source += f"layout(location = 0) out vec4 color;\nvoid main() {{ color = vec4({name}(x)); }}\n"
-    (tmp_path / "formula.frag").write_text(source)
+    (folder / "formula.frag").write_text(source)
     hlsl = write_formula(formula, problem, "hlsl")
     hlsl += f"\nfloat4 main(float x : TEXCOORD0) : SV_Target {{ return {name}(x).xxxx; }}\n"
-    (tmp_path / "formula.hlsl").write_text(hlsl)
+    (folder / "formula.hlsl").write_text(hlsl)
     for words in (["formula.frag"], ["-D", "-V", "-S", "frag", "-e", "main", "formula.hlsl"]):
         done = subprocess.run(
-            [validator, *words], cwd=tmp_path, capture_output=True, text=True, check=False
+            [validator, *words], cwd=folder, capture_output=True, text=True, check=False
         )
         assert done.returncode == 0, done.stdout
         assert "WARNING" not in done.stdout
 
 
-def test_latex_says_the_same(found):
-    problem, formula, _ = found
+def test_latex_says_the_same(solved):
+    problem, formula, _ = solved
     text = write_formula(formula, problem, "latex").splitlines()[-1]
     assert text.count("{") == text.count("}")
     assert text.count(r"\left(") == text.count(r"\right)")
@@ -127,31 +148,118 @@ def test_latex_says_the_same(found):
         assert str(np.float32(abs(coefficient))).partition("e")[0] in text
 
 
-def test_the_comment_states_what_was_promised(found):
-    problem, formula, _ = found
+def test_the_comment_states_what_was_promised(solved):
+    problem, formula, _ = solved
     code = write_formula(formula, problem, "c")
     assert code.isascii()
     assert f"for {problem.low:.10g} to {problem.high:.10g}" in code
-    assert f"the {problem.metric.name} metric" in code
+    assert f"the {problem.metric} metric" in code
     assert f"{formula.error:.2g} in float32" in code
     assert f"{formula.shape.operations} operations" in code
 
 
-def test_operations_are_those_of_the_code(found):
-    problem, formula, _ = found
+def test_operations_are_those_of_the_code(solved):
+    problem, formula, _ = solved
     lines = write_formula(formula, problem, "glsl").splitlines()
     body = " ".join(line for line in lines if line.startswith("    "))
     cheap = sum(body.count(f" {sign} ") for sign in "+-*")
     slow = body.count(" / ") + body.count("sqrt(")
-    glossy = sum(
-        bool(side.encoding) and side.encoding.name == "glossiness"
-        for side in (problem.source, problem.target)
-    )
+    glossy = [problem.source.stored.name, problem.target.stored.name].count("glossiness")
     assert cheap + 4 * slow == formula.shape.operations + glossy
 
 
+@pytest.fixture(scope="module")
+def simple():
+    problem = Problem(*endpoints("blinn-phong", "ggx"), metric_named("energy"), 1, 1e4)
+    return problem, cheapest(problem, 0.1)
+
+
+def test_the_comment_spells_the_metrics_setting(simple):
+    problem, formula = simple
+    exposed = Problem(problem.source, problem.target, metric_named("display:4"), 1, 1e4)
+    assert "under the display:4 metric: keeps the picture" in write_formula(formula, exposed, "c")
+
+
+def stored_as(name, **options):
+    """Return an end of GGX that stores α under another name."""
+    parameter = Parameter(name, "α", (0.01, 0.8), 0.0, 1.0, **options)
+    return Endpoint(
+        endpoint("ggx").distribution,
+        Encoding(name, parameter, lambda stored: stored, lambda alpha: alpha, ""),
+    )
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["scale", "u", "v", "w", "w2", "sqrt", "half", "lambda", "float", "float3", "sample", "in",
+     "m_B", "mean slope", "α", "2nd", "input", "register", "row__major", "Texture"],
+)  # fmt: skip
+def test_any_name_of_a_parameter_is_valid_code(name, tmp_path):
+    # Of all shapes the one that needs most names: 1 − w⁴ under a root.
+    problem = Problem(stored_as(name), endpoint("beckmann"), metric_named("unit"), 0.01, 0.8)
+    shape = Shape(variable=4.0, factor=1.0, outer=0.5, numerator=2, denominator=2)
+    formula = Formula(shape, (1.0, 0.5), (0.25, 0.125), 0.1)
+    values = np.linspace(0.1, 0.8, 5)
+    w4 = values**4
+    wanted = np.sqrt(values * (1 + 0.5 * w4) / (1 + 0.25 * w4 + 0.125 * w4**2))
+    code = write_formula(formula, problem, "python")
+    scope = {}
+    exec(code, scope)
+    np.testing.assert_allclose(scope[function_name(code)](values), wanted)
+    for compiler in COMPILERS:
+        call = compiled(compiler, write_formula(formula, problem, "c"), tmp_path)
+        np.testing.assert_allclose(list(map(call, values)), wanted, rtol=1e-6)
+    for validator in VALIDATORS:
+        validate(validator, problem, formula, tmp_path)
+
+
+def test_names_of_arguments_say_what_they_are():
+    for entry in list_distributions():
+        for parameter in (entry.parameter, *(encoding.stored for encoding in entry.encodings)):
+            assert argument_name(parameter.name) == parameter.name
+    assert argument_name("half") == "half_value"
+
+
+def test_a_glossiness_is_known_by_what_is_declared(simple):
+    assert is_glossy(endpoint("beckmann:glossiness"))
+    assert is_glossy(stored_as("sheen", larger_is_smoother=True))
+    assert not is_glossy(stored_as("alpha"))
+    assert not is_glossy(endpoint("blinn-phong"))
+
+
+@pytest.mark.parametrize(
+    ("gamma", "name"),
+    [
+        (None, "gtr_alpha_from_beckmann_alpha"),
+        (2.0, "gtr_alpha_from_beckmann_alpha"),
+        (3.0, "gtr_gamma_3_alpha_from_beckmann_alpha"),
+        (2.5, "gtr_gamma_2_5_alpha_from_beckmann_alpha"),
+    ],
+)
+def test_a_second_parameter_is_in_the_name_if_it_is_not_the_usual(gamma, name):
+    source, target = endpoints("beckmann", "gtr", gamma)
+    problem = Problem(source, target, metric_named("unit"), 0.01, 0.5)
+    formula = cheapest(problem, 0.02)
+    codes = {language: write_formula(formula, problem, language) for language in LANGUAGES.names}
+    assert function_name(codes["c"]) == name
+    assert all(f"to gtr C_TR at gamma = {gamma or 2:g}, for" in code for code in codes.values())
+    values = values_in(problem)
+    scope = {}
+    exec(codes["python"], scope)
+    got = scope[name](values.astype(float))
+    assert worst(problem, got, exact(problem, values)) <= formula.error * 1.02 + 3e-7
+
+
+def test_two_values_of_gamma_are_two_distributions():
+    (first,), (second,) = (endpoints("gtr", "gtr", gamma)[:1] for gamma in (2.0, 3.0))
+    problem = Problem(first, second, metric_named("unit"), 0.01, 0.5)
+    assert cheapest(problem, 0.05).error <= 0.05
+    with pytest.raises(MdfconvError, match="two distributions"):
+        Problem(second, second, metric_named("unit"), 0.01, 0.5)
+
+
 def test_no_formula_of_the_front_is_beaten():
-    problem = Problem(endpoint("blinn-phong"), endpoint("ggx"), metric("energy"), 1, 1e4)
+    problem = Problem(endpoint("blinn-phong"), endpoint("ggx"), metric_named("energy"), 1, 1e4)
     front = pareto_front(problem)
     prices = [formula.shape.operations for formula in front]
     errors = [formula.error for formula in front]
@@ -167,7 +275,7 @@ def test_coefficients_are_nearly_minimax():
     """A polynomial is compared with the exact minimax one, from linear programming."""
     from scipy.optimize import linprog
 
-    problem = Problem(endpoint("beckmann"), endpoint("gauss"), metric("energy"), 0.01, 0.7)
+    problem = Problem(endpoint("beckmann"), endpoint("gauss"), metric_named("energy"), 0.01, 0.7)
     w, t = problem.samples
     front = {f.shape: f for f in pareto_front(problem)}
     shape, formula = next(
@@ -186,13 +294,13 @@ def test_coefficients_are_nearly_minimax():
     [("ggx", "blinn-phong", 0.01, 0.1), ("smoothie", "beckmann", 0.001, 0.01)],
 )
 def test_nearly_exact_shapes_do_not_break_the_search(source, target, low, high):
-    problem = Problem(endpoint(source), endpoint(target), metric("unit"), low, high)
+    problem = Problem(endpoint(source), endpoint(target), metric_named("unit"), low, high)
     front = pareto_front(problem)
     assert front[-1].error < 1e-6
 
 
 def test_tolerances_that_cannot_be_met_say_what_can():
-    problem = Problem(endpoint("beckmann"), endpoint("ggx"), metric("unit"), 0.01, 1)
+    problem = Problem(endpoint("beckmann"), endpoint("ggx"), metric_named("unit"), 0.01, 1)
     with pytest.raises(MdfconvError, match=r"no formula is within 1e-08 in float32; the most acc"):
         cheapest(problem, 1e-8)
     for bad in (0.0, -1.0, math.nan):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import mdfconv
+from mdfconv.distributions import one_parameter_distributions
 from tests.cli.runner import run
 
 BETA_DEGREES = np.arange(0, 88, 2.0)
@@ -80,7 +81,7 @@ def test_all_distributions_best_first(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text(table(BETA_DEGREES, [0.1 + 2 * GGX], "deg,v"))
     records, err = fit(path)
-    assert len(records) == 8
+    assert len(records) == len(one_parameter_distributions())
     errors = [record["rmse"] for record in records]
     assert errors == sorted(errors)
     assert sum(record["simplest"] for record in records) == 1
@@ -158,7 +159,7 @@ GOOD = table(BETA_DEGREES, [0.1 + 2 * GGX], "deg,v")
         ("deg\n1\n2\n", (), "one column is not enough"),
         (GOOD, ("--angle", "phi"), "no column 'phi'; there are deg, v"),
         (GOOD, ("--values", "7"), "no column '7'"),
-        ("a,v\n0.1,1\n0.2,2\n0.3,4\n0.4,3\n0.5,3\n", (), "give --angle-unit"),
+        ("a,v\n0.1,1\n0.2,2\n0.3,4\n0.4,3\n0.5,3\n", (), "degrees, radians or cosines"),
         (GOOD, ("--angle-unit", "gradians"), "unknown angle unit"),
         ("deg,v\n1,2\n100,2\n", (), "outside 0 to 90"),
         ("cos,v\n1,2\n-0.5,2\n", (), "outside 0 to 1"),
@@ -177,7 +178,7 @@ GOOD = table(BETA_DEGREES, [0.1 + 2 * GGX], "deg,v")
         (GOOD, ("--gamma", "0"), "γ > 0"),
         (GOOD, ("--angle", "²"), "no column"),
         ("deg,v\n" + "".join(f"{k},{k}\n" for k in range(20)), (), "no lobe to fit"),
-        ("#DIM 1 3\n#PARAM_IN COS_TH\n1 1 1 1\n", ("--angle", "2"), "give no --angle"),
+        ("#DIM 1 3\n#PARAM_IN COS_TH\n1 1 1 1\n", ("--angle", "2"), "choose no columns"),
         (GOOD, ("--png", "/nonexistent/a.png"), "cannot write"),
         (GOOD, ("--output", "/nonexistent/a.csv"), "cannot write"),
     ],
@@ -197,7 +198,7 @@ def test_nothing_is_written_over_or_left_behind(tmp_path):
     for option in ("--output", "--png"):
         status, out, err = run("fit", path, "--to", "ggx", option, path)
         assert (status, out) == (2, "")
-        assert "is the file of samples" in err
+        assert "is the input; write to another file" in err
     assert path.read_text() == GOOD
     picture = tmp_path / "a.png"
     status, _, _ = run("fit", path, "--to", "ggx", "--png", picture, "--output", "/proc/x/y")

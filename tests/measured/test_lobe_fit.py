@@ -1,11 +1,12 @@
 """Fits to samples: true parameters come back, with errors that mean what they say."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
 import mdfconv
-from mdfconv.distributions.gtr import GTR
 from mdfconv.measured.lobe_fit import fit_lobe, foreshortening, rank, simplest
 from mdfconv.measured.samples import Samples
 
@@ -30,24 +31,78 @@ def synthetic(name, rng=None, noise=0.01, quantity="ndf", offsets=(0.05,), scale
 @pytest.mark.parametrize("name", TRUTH)
 def test_exact_data_comes_back(name, quantity, loss):
     data = synthetic(name, quantity=quantity, offsets=(0.05, 0.1, 0.2), scales=(2.0, 1.0, 0.5))
-    found = fit_lobe(data, mdfconv.distribution(name), loss)
-    assert found.parameters[0] == pytest.approx(TRUTH[name], rel=1e-6)
-    np.testing.assert_allclose(found.offset, (0.05, 0.1, 0.2), rtol=1e-5)
-    np.testing.assert_allclose(found.scale, (2.0, 1.0, 0.5), rtol=1e-5)
-    model = found.model(BETA, quantity)
+    fit = fit_lobe(data, mdfconv.distribution(name), loss)
+    assert fit.parameters[0] == pytest.approx(TRUTH[name], rel=1e-6)
+    np.testing.assert_allclose(fit.offset, (0.05, 0.1, 0.2), rtol=1e-5)
+    np.testing.assert_allclose(fit.scale, (2.0, 1.0, 0.5), rtol=1e-5)
+    model = fit.model(BETA, quantity)
     np.testing.assert_allclose(model, data.values, rtol=1e-4)
 
 
-def test_gtr_finds_gamma():
-    lobe = GTR(2.8).unit(BETA, 0.25)
-    data = Samples(BETA, 0.1 + 3 * lobe[:, None], ("1",), "ndf")
-    found = fit_lobe(data, GTR())
-    assert found.parameters == pytest.approx((0.25, 2.8), rel=1e-5)
-    fixed = fit_lobe(data, GTR(), gamma=2)
+def of_two_parameters(name, alpha, gamma, quantity="ndf"):
+    lobe = mdfconv.distribution(name).unit(BETA, alpha, gamma=gamma)
+    lobe = lobe / foreshortening(BETA, quantity)
+    return Samples(BETA, 0.1 + 3 * lobe[:, None], ("1",), quantity)
+
+
+TWO_PARAMETERS = [
+    ("gtr", 0.25, 2.8),
+    ("gtr", 0.4, 0.6),
+    ("student-t", 0.25, 2.8),
+    ("student-t", 0.05, 5.0),
+    ("student-t", 0.6, 2.3),
+    # Beyond α² = γ/(2(γ−1)) the maximum is off the normal.
+    ("student-t", 1.5, 20.0),
+]
+
+
+@pytest.mark.parametrize("loss", ["linear", "log"])
+@pytest.mark.parametrize("quantity", ["ndf", "brdf"])
+@pytest.mark.parametrize(("name", "alpha", "gamma"), TWO_PARAMETERS)
+def test_gamma_comes_back(name, alpha, gamma, quantity, loss):
+    data = of_two_parameters(name, alpha, gamma, quantity)
+    fit = fit_lobe(data, mdfconv.distribution(name), loss)
+    assert fit.parameters == pytest.approx((alpha, gamma), rel=1e-5)
+    assert fit.distribution.gamma == fit.parameters[1]
+    assert not fit.at_limit
+    np.testing.assert_allclose(fit.model(BETA, quantity), data.values, rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["gtr", "student-t"])
+def test_a_gamma_that_is_given_is_kept(name):
+    data = of_two_parameters(name, 0.25, 2.8)
+    fixed = fit_lobe(data, mdfconv.distribution(name), gamma=2)
     assert len(fixed.parameters) == 1
-    assert fixed.parameters[0] == pytest.approx(
-        fit_lobe(data, mdfconv.distribution("ggx")).parameters[0], rel=1e-6
-    )
+    assert not fixed.at_limit
+    # Both are GGX at 2; a distribution without γ does not ask for it.
+    ggx = fit_lobe(data, mdfconv.distribution("ggx"), gamma=2)
+    assert fixed.parameters == pytest.approx(ggx.parameters, rel=1e-6)
+    with pytest.raises(ValueError, match="outside the legal range"):
+        fit_lobe(data, mdfconv.distribution(name), gamma=-1)
+
+
+def test_a_gamma_at_the_end_of_its_range_is_told():
+    # γ = 2 is GGX, below it there is nothing; Beckmann is γ → ∞.
+    student = mdfconv.distribution("student-t")
+    ends = student.second_parameter.fit_range
+    for name, gamma in (("ggx", ends[0]), ("beckmann", ends[1])):
+        fit = fit_lobe(synthetic(name), student)
+        assert fit.at_limit
+        assert fit.parameters == pytest.approx((TRUTH[name], gamma), rel=2e-3)
+    assert not fit_lobe(synthetic("ggx"), mdfconv.distribution("gtr")).at_limit
+
+
+def test_standard_errors_of_gamma_cover_the_truth():
+    rng = np.random.default_rng(17)
+    cases = list(itertools.islice(itertools.cycle(TWO_PARAMETERS[:5]), 40))
+    within = 0
+    for name, alpha, gamma in cases:
+        exact = of_two_parameters(name, alpha, gamma)
+        noisy = exact.values + 0.01 * rng.normal(size=exact.values.shape)
+        fit = fit_lobe(Samples(BETA, noisy, ("1",), "ndf"), mdfconv.distribution(name))
+        off = np.abs(np.array(fit.parameters) - (alpha, gamma))
+        within += bool((off <= 3 * np.array(fit.errors)).all())
+    assert within >= 37
 
 
 def test_standard_errors_cover_the_truth():
@@ -56,14 +111,14 @@ def test_standard_errors_cover_the_truth():
     within = 0
     for trial in range(200):
         name = names[trial % len(names)]
-        found = fit_lobe(synthetic(name, rng), mdfconv.distribution(name))
-        within += abs(found.parameters[0] - TRUTH[name]) <= 3 * found.errors[0]
+        fit = fit_lobe(synthetic(name, rng), mdfconv.distribution(name))
+        within += abs(fit.parameters[0] - TRUTH[name]) <= 3 * fit.errors[0]
     assert within >= 190
 
 
 def test_parameter_and_error_against_curve_fit():
     data = synthetic("ggx", np.random.default_rng(3))
-    found = fit_lobe(data, mdfconv.distribution("ggx"))
+    fit = fit_lobe(data, mdfconv.distribution("ggx"))
 
     def model(beta, a, offset, scale):
         return offset + scale * (a**2 / (a**2 + (1 - a**2) * np.sin(beta) ** 2)) ** 2
@@ -71,21 +126,21 @@ def test_parameter_and_error_against_curve_fit():
     best, covariance = curve_fit(
         model, BETA, data.values[:, 0], p0=(0.2, 0, 1), xtol=1e-14, ftol=1e-14
     )
-    assert found.parameters[0] == pytest.approx(best[0], rel=1e-7)
-    assert (found.offset[0], found.scale[0]) == pytest.approx(tuple(best[1:]), rel=1e-6)
-    assert found.errors[0] == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-3)
+    assert fit.parameters[0] == pytest.approx(best[0], rel=1e-7)
+    assert (fit.offset[0], fit.scale[0]) == pytest.approx(tuple(best[1:]), rel=1e-6)
+    assert fit.errors[0] == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-3)
     residual = data.values[:, 0] - model(BETA, *best)
-    assert found.rmse == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-9)
+    assert fit.rmse == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-9)
     n, cost = BETA.size, np.sum(residual**2)
-    assert found.aic == pytest.approx(n * np.log(cost / n) + 6)
-    assert found.bic == pytest.approx(n * np.log(cost / n) + 3 * np.log(n))
+    assert fit.aic == pytest.approx(n * np.log(cost / n) + 6)
+    assert fit.bic == pytest.approx(n * np.log(cost / n) + 3 * np.log(n))
 
 
 def test_logarithmic_loss_against_curve_fit():
     rng = np.random.default_rng(5)
     data = synthetic("gauss")
     noisy = data.values * np.exp(0.02 * rng.normal(size=data.values.shape))
-    found = fit_lobe(Samples(BETA, noisy, ("1",), "ndf"), mdfconv.distribution("gauss"), "log")
+    fit = fit_lobe(Samples(BETA, noisy, ("1",), "ndf"), mdfconv.distribution("gauss"), "log")
 
     def model(beta, m, offset, scale):
         return np.log(np.maximum(offset + scale * np.exp(-((beta / m) ** 2)), 1e-9))
@@ -93,15 +148,15 @@ def test_logarithmic_loss_against_curve_fit():
     best, covariance = curve_fit(
         model, BETA, np.log(noisy[:, 0]), p0=(0.25, 0.05, 2), xtol=1e-14, ftol=1e-14
     )
-    assert found.parameters[0] == pytest.approx(best[0], rel=1e-6)
-    assert found.errors[0] == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-2)
+    assert fit.parameters[0] == pytest.approx(best[0], rel=1e-6)
+    assert fit.errors[0] == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-2)
 
 
 def test_ranking_and_the_simplest():
     data = synthetic("ggx", np.random.default_rng(8), offsets=(0.1, 0.1), scales=(2.0, 1.0))
-    fits = [fit_lobe(data, entry) for entry in mdfconv.list_distributions()]
+    fits = [fit_lobe(data, target) for target in mdfconv.list_distributions()]
     ranked = rank(fits, "linear")
-    assert [entry.rmse for entry in ranked] == sorted(entry.rmse for entry in fits)
+    assert [fit.rmse for fit in ranked] == sorted(fit.rmse for fit in fits)
     assert simplest(fits, 0.05, "linear").distribution.name == "ggx"
     assert simplest(fits, 1e9, "linear").distribution.name == "ggx"
     assert simplest(fits, 0, "linear") in ranked[:3]

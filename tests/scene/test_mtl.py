@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import mdfconv
+from mdfconv.fitting.metrics import metric_named
 from mdfconv.scene import convert_mtl
+from mdfconv.scene.shininess import (
+    IMPORTER_RULES,
+    error_of,
+    exponent_of,
+    importer_results,
+    roughness_of,
+)
 from tests.cli.runner import run
 
 DATA = Path(__file__).parent / "data"
@@ -241,9 +249,9 @@ def test_a_bad_statement_turns_the_status_to_1(tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["a.mtl"], "give either -o OUTPUT or --in-place"),
-        (["a.mtl", "-o", "x.mtl", "--in-place"], "give either -o OUTPUT or --in-place"),
-        (["a.mtl", "-o", "a.mtl"], "it is the input: use --in-place"),
+        (["a.mtl"], "in place, or into another file or folder"),
+        (["a.mtl", "-o", "x.mtl", "--in-place"], "in place, or into another file or folder"),
+        (["a.mtl", "-o", "a.mtl"], "it is the input"),
         (["a.mtl", "-o", "b.mtl"], "will not write b.mtl: it exists"),
         (["a.mtl", "b.mtl", "-o", "x.mtl"], "2 libraries need a folder"),
         (["a.mtl", "sub/a.mtl", "-o", "new"], "would both be written to new/a.mtl"),
@@ -281,6 +289,38 @@ def test_errors_are_those_of_the_conversion():
         assert entry.rmse == pytest.approx(wanted.rmse, rel=1e-4)
     assert not any(math.isnan(entry.rmse) for entry in found)
     assert np.all(np.diff([entry.roughness for entry in found]) < 0)
+
+
+def test_any_metric_is_answered():
+    """Those without stored fits by the fit itself."""
+    exponents = np.array([1.0, 2.0, 80.0])
+    metric = metric_named("display:4")
+    roughness = roughness_of(exponents, metric)
+    expected = mdfconv.convert(exponents, "blinn-phong", "ggx:roughness", "fit", metric=metric)
+    assert np.array_equal(roughness, expected)
+    assert exponent_of(roughness, metric) == pytest.approx(exponents, rel=1e-6)
+    (material,) = convert_mtl(b"newmtl a\nNs 80\n", metric="display:4").materials
+    assert material.roughness == pytest.approx(expected[2], rel=1e-9)
+
+
+def test_the_inverse_answers_beyond_what_libraries_hold():
+    metric = metric_named("energy")
+    assert exponent_of(np.array([1.0, 1 - 1e-12, 1e-6]), metric) == pytest.approx([0, 1e-6, 1e18])
+    exponents = np.geomspace(1e-3, 1e9, 25)
+    back = exponent_of(roughness_of(exponents, metric), metric)
+    assert back == pytest.approx(exponents, rel=1e-6)
+
+
+def test_importers_are_compared_as_data():
+    exponents, metric = np.array([1.0, 100.0, 2000.0]), metric_named("energy")
+    results = importer_results(exponents, metric)
+    assert [[result.rule for result in row] for row in results] == [list(IMPORTER_RULES)] * 3
+    assert [result.roughness for result in results[1]] == pytest.approx([0.9, 1 - 0.1**0.5, 0])
+    for row, exponent in zip(results, exponents, strict=True):
+        for result in row:
+            alone = error_of(np.array([exponent]), np.array([result.roughness]), metric)
+            assert result.rmse == pytest.approx(alone[0], rel=1e-12)
+    assert math.isinf(results[2][0].rmse)
 
 
 def test_textures_are_converted_beside_the_result(tmp_path):

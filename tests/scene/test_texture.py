@@ -45,12 +45,12 @@ def levels(dtype):
 @pytest.mark.parametrize(("source", "target"), RULES)
 def test_table_is_what_convert_says_of_each_texel(source, target, method):
     rule = TextureRule(source, target, method)
-    found = quiet(levels(np.uint8), rule, depth=16)
-    sides = rule.endpoints()
+    texels = quiet(levels(np.uint8), rule, depth=16)
+    ends = rule.endpoints()
     compared = 0
-    for level, texel in enumerate(found):
+    for level, texel in enumerate(texels):
         try:
-            answer = mdfconv.convert(level / 255, *sides, method)
+            answer = mdfconv.convert(level / 255, *ends, method)
         except MdfconvError:
             continue
         assert texel == round(min(max(answer, 0), 1) * 65535)
@@ -60,11 +60,44 @@ def test_table_is_what_convert_says_of_each_texel(source, target, method):
 
 def test_the_fit_and_the_closed_form_are_methods_too():
     few = np.array([[64, 128]], np.uint8)
-    sides = "ggx:roughness", "beckmann:roughness"
+    pair = "ggx:roughness", "beckmann:roughness"
     for method in ("fit", "closed-form"):
-        found = convert_texture(few, TextureRule(*sides, method, "energy"), depth=16)
-        expected = mdfconv.convert(few / 255, *sides, method, metric="energy")
-        assert np.array_equal(found, np.rint(expected * 65535))
+        converted = convert_texture(few, TextureRule(*pair, method, "energy"), depth=16)
+        expected = mdfconv.convert(few / 255, *pair, method, metric="energy")
+        assert np.array_equal(converted, np.rint(expected * 65535))
+
+
+def test_the_metric_spells_its_exposure():
+    few = np.array([0.1, 0.3])
+    rule = TextureRule("ggx", "beckmann", "fit", "display:4")
+    expected = mdfconv.convert(few, "ggx", "beckmann", "fit", metric="display:4")
+    assert np.array_equal(convert_texture(few, rule), expected)
+    assert not np.allclose(expected, mdfconv.convert(few, "ggx", "beckmann", metric="display"))
+
+
+@pytest.mark.parametrize("target", ["gtr", "student-t"])
+def test_a_second_parameter(target):
+    few = np.array([0.2, 0.6])
+    rule = TextureRule("ggx:alpha", target, "fit", gamma=3.0)
+    expected = mdfconv.convert(few, "ggx", target, "fit", gamma=3.0)
+    assert np.array_equal(convert_texture(few, rule), expected)
+    # The usual γ makes both GGX.
+    assert np.array_equal(convert_texture(few, TextureRule("ggx", target)), few)
+
+
+def test_what_goes_beyond_1_needs_an_encoding():
+    for entry in mdfconv.list_distributions():
+        rule = TextureRule(entry.name, "ggx")
+        if entry.parameter.typical[1] <= 1:
+            assert rule.endpoints()[0].encoding is None
+            continue
+        with pytest.raises(MdfconvError, match="needs an encoding"):
+            rule.endpoints()
+        for encoding in ("exponent", "log2"):
+            end, _ = TextureRule(f"{entry.name}:{encoding}", "ggx").endpoints()
+            assert end.stored.larger_is_smoother == entry.parameter.larger_is_smoother
+            low, high = end.stored.typical
+            assert 0 <= low < high <= 1
 
 
 @pytest.mark.parametrize(("source", "target"), RULES)
@@ -258,9 +291,12 @@ def test_arrays_that_are_no_texture(array, options, words):
         (("ggx", "ggy"), "did you mean"),
         (("gauss", "ggx", "ward"), "ward has no conversion"),
         (("ggx", "beckmann", "fast", "energetic"), "metric"),
-        (("ggx", "beckmann", "fast", "display", 2.0), "exposure 1 only"),
-        (("blinn-phong:exponent", "ggx", "fast", "unit", 1.0, 0.0), "above 0"),
-        (("blinn-phong:log2", "ggx", "fast", "unit", 1.0, 1e3, np.inf), "log2"),
+        (("ggx", "beckmann", "fast", "display:2"), "fast has no conversions stored .*; use fit"),
+        (("blinn-phong:exponent", "ggx", "fast", "unit", 0.0), "above 0"),
+        (("blinn-phong:log2", "ggx", "fast", "unit", 1e3, np.inf), "log2"),
+        (("ggx", "beckmann", "fast", "unit", 1e3, 13.0, 2.0), "neither ggx nor beckmann has a sec"),
+        (("ggx", "student-t", "fast", "unit", 1e3, 13.0, 1.0), "student-t γ = 1"),
+        ((3, "ggx"), "named by a string"),
     ],
 )
 def test_rules_that_are_none(rule, words):

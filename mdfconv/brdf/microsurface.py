@@ -1,0 +1,199 @@
+"""A surface of microfacets: D, Smith's masking and the sampling of one distribution.
+
+Directions are unit vectors, shape (..., 3), with the surface normal along z; m is the normal of a
+microfacet. Random numbers u₁, u₂ are uniform on [0, 1), of any shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdfconv.brdf.directions import azimuth, direction, dot, polar_angle, unit
+from mdfconv.distributions import Distribution
+from mdfconv.distributions import distribution as distribution_named
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+
+# Of an isotropic surface, or along x and y of an anisotropic one.
+Roughness: TypeAlias = float | tuple[float, float]
+
+# Its facets, moved together, make an ellipsoid, of which one can draw what a viewer sees.
+_ELLIPSOID = "ggx"
+# The z of a normal that is level but for rounding: the facet belongs to the upper side.
+_LEVEL = 1e-300
+
+
+@dataclass(frozen=True)
+class Microsurface:
+    """A distribution with its parameter, and what follows from it.
+
+    Parameters
+    ----------
+    distribution : Distribution
+        That of the microfacets' normals.
+    parameter : float or tuple of two floats
+        Its parameter; a pair makes it anisotropic.
+    normalized : bool
+        Whether D is the normalized form (1/sr) or the unit form. Masking and sampling do not
+        depend on it.
+
+    Raises
+    ------
+    MdfconvError
+        If the parameter is illegal.
+    """
+
+    distribution: Distribution
+    parameter: Roughness
+    normalized: bool = True
+
+    def __post_init__(self) -> None:
+        for value in _pair(self.parameter):
+            self.distribution.parameter.check_one(value, self.distribution.label)
+
+    def at_angle(self, theta: Array, phi: Array | None = None) -> Array:
+        """Return D at angles from the surface normal, [0, π/2], and azimuths if it has a pair."""
+        form = self.distribution.normalized if self.normalized else self.distribution.unit
+        return np.asarray(form(theta, self.parameter, phi=phi))
+
+    def density(self, m: Array) -> Array:
+        """Return D at microfacet normals, shape (..., 3); 0 below the surface."""
+        theta = np.minimum(polar_angle(m), np.pi / 2)
+        phi = azimuth(m) if isinstance(self.parameter, tuple) else None
+        return np.where(m[..., 2] > 0, self.at_angle(theta, phi), 0)
+
+    @cached_property
+    def _smith(self) -> tuple[Distribution, tuple[float, float]] | None:
+        """The distribution of the same lobe whose Λ is known, and its roughness along x and y."""
+        form, pair = self.distribution, _pair(self.parameter)
+        while not form.smith:
+            equal = form.equivalent
+            if equal is None or not equal.same_lobe:
+                return None
+            x, y = equal.forward(np.array(pair)).tolist()
+            form, pair = distribution_named(equal.name), (x, y)
+        return form, pair
+
+    def smith_lambda(self, omega: Array) -> Array:
+        """Return Smith's Λ for directions.
+
+        Parameters
+        ----------
+        omega : numpy.ndarray, shape (..., 3)
+            The directions; above or below the surface alike.
+
+        Returns
+        -------
+        numpy.ndarray, shape (...)
+            Λ ≥ 0, infinite at grazing.
+
+        Raises
+        ------
+        MdfconvError
+            If no closed form is known for the distribution.
+        """
+        if self._smith is None:
+            raise MdfconvError(f"{self.distribution.label} has no closed form of Smith's masking")
+        form, (alpha_x, alpha_y) = self._smith
+        x, y, z = np.moveaxis(omega, -1, 0)
+        with np.errstate(divide="ignore", over="ignore"):
+            # α tan θ, along the azimuth of the direction.
+            return form.smith_lambda(np.hypot(alpha_x * x, alpha_y * y) / np.abs(z))
+
+    def smith_g1(self, omega: Array, m: Array) -> Array:
+        """Return Smith's G₁ = 1/(1+Λ) for directions, 0 where they see the facet from behind."""
+        return np.where(_faces(omega, m), 1 / (1 + self.smith_lambda(omega)), 0)
+
+    def separable(self, light: Array, view: Array, m: Array) -> Array:
+        """Return the separable G = G₁(l) G₁(v) (Walter et al. 2007, eq. 23)."""
+        return self.smith_g1(light, m) * self.smith_g1(view, m)
+
+    def correlated(self, light: Array, view: Array, m: Array) -> Array:
+        """Return the height-correlated G = 1/(1 + Λ_l + Λ_v) (Heitz 2014, eq. 99)."""
+        value = 1 / (1 + self.smith_lambda(light) + self.smith_lambda(view))
+        return np.where(_faces(light, m) & _faces(view, m), value, 0)
+
+    def half_vectors(self, u1: Array, u2: Array) -> Array:
+        """Draw microfacet normals with density D cos θ, by F or, for a pair, by stretched slopes.
+
+        Raises
+        ------
+        MdfconvError
+            If there is a pair of parameters and D does not scale with the slope.
+        """
+        phi = 2 * np.pi * u2
+        if not isinstance(self.parameter, tuple):
+            return direction(self.distribution.sample(u1, self.parameter), phi)
+        if not self.distribution.scales_with_slope:
+            raise MdfconvError(f"{self.distribution.label} has no sampler for a pair of parameters")
+        slope = np.tan(self.distribution.sample(u1, 1.0))
+        x, y = self.parameter
+        stretched = [x * slope * np.cos(phi), y * slope * np.sin(phi), np.ones_like(slope)]
+        return unit(np.stack(stretched, axis=-1))
+
+    def half_vector_density(self, m: Array) -> Array:
+        """Return the density of `half_vectors`, 1/sr: D cos θ."""
+        return replace(self, normalized=True).density(m) * np.maximum(m[..., 2], 0)
+
+    @property
+    def has_visible_normals(self) -> bool:
+        """Whether `visible_normals` can be drawn: of GGX, by whatever name."""
+        return self._smith is not None and self._smith[0].name == _ELLIPSOID
+
+    def visible_normals(self, view: Array, u1: Array, u2: Array) -> Array:
+        """Draw the microfacet normals that a viewer sees (Heitz 2018).
+
+        Parameters
+        ----------
+        view : numpy.ndarray, shape (..., 3)
+            Unit vector above the surface.
+        u1, u2 : numpy.ndarray
+            Uniform random numbers.
+
+        Raises
+        ------
+        MdfconvError
+            If the distribution is not GGX.
+        """
+        if self._smith is None or not self.has_visible_normals:
+            raise MdfconvError(
+                f"{self.distribution.label} has no sampler of visible normals",
+                f"{_ELLIPSOID} has one",
+            )
+        scale = np.array([*self._smith[1], 1.0])
+        stretched = unit(view * scale)
+        # One axis is level, the other rises towards the normal: where the disk is squeezed.
+        x, y, _ = np.moveaxis(stretched, -1, 0)
+        turned = np.where(x * x + y * y > 0, np.arctan2(x, -y), 0)
+        first = direction(np.full_like(turned, np.pi / 2), turned)
+        second = np.cross(stretched, first)
+        radius, phi = np.sqrt(u1), 2 * np.pi * u2
+        t1, t2 = radius * np.cos(phi), radius * np.sin(phi)
+        share = 0.5 * (1 + stretched[..., 2])
+        t2 = (1 - share) * np.sqrt(np.maximum(0, 1 - t1 * t1)) + share * t2
+        t3 = np.sqrt(np.maximum(0, 1 - t1 * t1 - t2 * t2))
+        normal = t1[..., None] * first + t2[..., None] * second + t3[..., None] * stretched
+        normal = normal * scale
+        normal[..., 2] = np.maximum(normal[..., 2], _LEVEL)
+        return unit(normal)
+
+    def visible_normal_density(self, view: Array, m: Array) -> Array:
+        """Return the density of `visible_normals`, 1/sr: G₁ D max(0, v·m)/(n·v)."""
+        shadow = self.smith_g1(view, m) * replace(self, normalized=True).density(m)
+        return shadow * np.maximum(dot(view, m), 0) / view[..., 2]
+
+
+def _pair(parameter: Roughness) -> tuple[float, float]:
+    """Return the parameter along x and y."""
+    return parameter if isinstance(parameter, tuple) else (parameter, parameter)
+
+
+def _faces(omega: Array, m: Array) -> NDArray[np.bool_]:
+    """Return where directions see the same side of the facet and of the surface."""
+    seen: NDArray[np.bool_] = dot(omega, m) * omega[..., 2] > 0
+    return seen

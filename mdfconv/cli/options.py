@@ -1,0 +1,192 @@
+"""The options that commands share, each with one wording."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mdfconv.errors import MdfconvError
+
+if TYPE_CHECKING:
+    from mdfconv.conversion.arrays import Gamma
+    from mdfconv.fitting.metrics import Metric
+
+_LARGEST_DPI = 2400
+
+
+class Format(StrEnum):
+    """The forms in which results are written."""
+
+    table = "table"
+    plain = "plain"
+    csv = "csv"
+    json = "json"
+    markdown = "markdown"
+
+
+def _distributions(incomplete: str) -> list[str]:
+    from mdfconv.distributions import list_distributions
+
+    names = [mdf.name for mdf in list_distributions()]
+    return [name for name in names if name.startswith(incomplete)]
+
+
+def _methods(incomplete: str) -> list[str]:
+    from mdfconv.conversion import list_methods
+
+    return [method.name for method in list_methods() if method.name.startswith(incomplete)]
+
+
+def _metrics(incomplete: str) -> list[str]:
+    from mdfconv.fitting.metrics import list_metrics
+
+    return [name for name in list_metrics() if name.startswith(incomplete)]
+
+
+FromOption = Annotated[
+    str,
+    typer.Option(
+        "--from",
+        metavar="MDF",
+        autocompletion=_distributions,
+        help="Distribution that the values belong to, such as beckmann, ggx or blinn-phong; "
+        "ggx:roughness and ggx:glossiness name stored forms of α.",
+    ),
+]
+ToOption = Annotated[
+    str,
+    typer.Option(
+        "--to",
+        metavar="MDF",
+        autocompletion=_distributions,
+        help="Distribution to convert to, as for --from.",
+    ),
+]
+MdfOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--mdf",
+        metavar="MDF",
+        autocompletion=_distributions,
+        help="Only this distribution; repeatable.",
+    ),
+]
+MethodOption = Annotated[
+    str | None,
+    typer.Option(
+        "--method",
+        metavar="METHOD",
+        autocompletion=_methods,
+        help="closed-form (keeps the lobe's shape, approximately), half-angle, ward, peak, "
+        "fit: exact, under the metric, or fast: the same from stored polynomials.",
+    ),
+]
+MetricOption = Annotated[
+    str,
+    typer.Option(
+        "--metric",
+        metavar="METRIC",
+        autocompletion=_metrics,
+        help="What a fit keeps, and what errors are taken of: unit (the shape of the lobe), energy "
+        "(the light) or display (the picture on a screen).",
+    ),
+]
+ExposureOption = Annotated[
+    float | None,
+    typer.Option(
+        "--exposure",
+        metavar="E",
+        help="Exposure of the display metric; 1, if not given, puts the source's peak at white.",
+    ),
+]
+GammaOption = Annotated[
+    str | None,
+    typer.Option(
+        "--gamma",
+        metavar="G",
+        help="Second parameter, of gtr and student-t; 2, which is ggx, if not given; free fits it.",
+    ),
+]
+FormatOption = Annotated[
+    Format | None,
+    typer.Option(
+        "--format",
+        help="Form of the output: by default a table on a terminal, in a pipe what a program reads "
+        "most easily, in a file what its name ends in.",
+    ),
+]
+OutputOption = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", metavar="FILE", help="Write to a file instead."),
+]
+FolderOption = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", metavar="DIR", help="Folder to write to; by default ./reports."),
+]
+PngOption = Annotated[
+    Path | None, typer.Option("--png", metavar="FILE", help="Draw the result into a picture.")
+]
+DpiOption = Annotated[
+    int,
+    typer.Option(
+        "--dpi", metavar="N", min=1, max=_LARGEST_DPI, help="Resolution of pictures, dots an inch."
+    ),
+]
+
+
+def chosen_metric(name: str, exposure: float | None = None) -> Metric:
+    """Return the metric for the two options.
+
+    Raises
+    ------
+    MdfconvError
+        If the name is not known, or the metric has no exposure.
+    """
+    from mdfconv.fitting.metrics import metric_named
+
+    if exposure is None:
+        return metric_named(name)
+    if metric_named(name).setting != "exposure":
+        raise MdfconvError(f"the {name} metric has no exposure: give no --exposure")
+    return metric_named(f"{name}:{exposure!r}")
+
+
+def every_metric(exposure: float | None = None) -> list[Metric]:
+    """Return all metrics, those that have an exposure with the one that was asked for."""
+    from mdfconv.fitting.metrics import list_metrics, metric_named
+
+    return [
+        chosen_metric(name, exposure if metric_named(name).setting == "exposure" else None)
+        for name in list_metrics()
+    ]
+
+
+def fixed_gamma(text: str | None) -> float | None:
+    """Return what ``--gamma`` says where it cannot be free; raise `MdfconvError` if it is."""
+    gamma = chosen_gamma(text)
+    if gamma is None or isinstance(gamma, float):
+        return gamma
+    raise MdfconvError("--gamma is a number here: only convert fits it")
+
+
+def chosen_gamma(text: str | None) -> Gamma:
+    """Return what ``--gamma`` says: None, a number or ``"free"``.
+
+    Raises
+    ------
+    MdfconvError
+        If it is something else.
+    """
+    from mdfconv.conversion.arrays import FREE
+
+    if text is None:
+        return None
+    if text.strip().lower() == FREE:
+        return FREE
+    try:
+        return float(text)
+    except ValueError:
+        raise MdfconvError(f"--gamma takes a number or {FREE}, not '{text}'") from None

@@ -1,0 +1,165 @@
+"""The one writer of tables: rows as text in every form, on a terminal, in a pipe, in a file."""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import typer
+
+from mdfconv.cli.options import Format
+from mdfconv.distributions.parameter import number_text
+from mdfconv.output.files import file_bytes, write_files
+from mdfconv.output.records import Record, cell_text, csv_text, json_text, markdown_text
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_PIPE_WIDTH = 160
+_WIDEST = 1000
+_ENDINGS = {".json": Format.json, ".md": Format.markdown, ".txt": Format.table}
+
+
+def value_text(value: float | tuple[float, ...]) -> str:
+    """Return a number, or a pair with a comma, in ten significant digits."""
+    return ",".join(map(number_text, value if isinstance(value, tuple) else (value,)))
+
+
+def form_of(
+    asked: Format | None, output: Path | None = None, *, in_pipe: Format = Format.csv
+) -> Format:
+    """Return the form that was asked for, or that of a file's name, a terminal or a pipe."""
+    if asked is not None:
+        return asked
+    if output is not None:
+        return _ENDINGS.get(output.suffix.lower(), Format.csv)
+    return Format.table if sys.stdout.isatty() else in_pipe
+
+
+def write_table(
+    columns: Sequence[str],
+    rows: Sequence[Record],
+    form: Format | None,
+    output: Path | None = None,
+    *,
+    title: str = "",
+    styles: Sequence[str] = (),
+) -> None:
+    """Write rows to standard output or to a file, in the form asked for.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Keys of the rows, in order: the headings.
+    rows : sequence of mapping
+        Cells: numbers, text, None for an empty one, tuples and lists of numbers or text.
+    form, output
+        As for `form_of`.
+    title : str
+        Above a table on a terminal.
+    styles : sequence of str
+        Rich's style of each row of a table on a terminal.
+    """
+    form = form_of(form, output)
+    if output is not None:
+        write_files({output: file_bytes(table_text(columns, rows, form))})
+    elif form is Format.table:
+        print_table(rich_table(columns, rows, title, styles))
+    else:
+        typer.echo(table_text(columns, rows, form))
+
+
+def table_text(columns: Sequence[str], rows: Sequence[Record], form: Format) -> str:
+    """Return rows as text in a form."""
+    if form is Format.json:
+        return json_text([{column: row[column] for column in columns} for row in rows])
+    flat = [{column: _flat(row[column]) for column in columns} for row in rows]
+    if form is Format.csv:
+        return csv_text(columns, flat)
+    if form is Format.markdown:
+        return markdown_text(columns, flat)
+    if form is Format.plain:
+        return "\n".join(" ".join(_plain_cell(row[column]) for column in columns) for row in flat)
+    from rich.console import Console
+
+    buffer = io.StringIO()
+    Console(file=buffer, width=_PIPE_WIDTH).print(rich_table(columns, rows))
+    return buffer.getvalue().rstrip()
+
+
+def rich_table(
+    columns: Sequence[str],
+    rows: Sequence[Record],
+    title: str = "",
+    styles: Sequence[str] = (),
+    right: Sequence[str] = (),
+) -> Any:
+    """Return a table for a terminal; numbers, and the columns named, stand to the right."""
+    from rich import box
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, title=title, title_style="bold", title_justify="left")
+    for column in columns:
+        text = column not in right and any(isinstance(row[column], str) for row in rows)
+        justify: Literal["left", "right"] = "left" if text else "right"
+        table.add_column(column, justify=justify, overflow="fold", no_wrap=not text)
+    for number, row in enumerate(rows):
+        cells = [escape(cell_text(_flat(row[column]))) for column in columns]
+        table.add_row(*cells, style=styles[number] if styles else None)
+    return table
+
+
+def print_table(table: Any) -> None:
+    """Print a Rich table, wider than the terminal rather than with numbers broken."""
+    from rich.console import Console
+
+    out = console()
+    needed = out.measure(table, options=out.options.update(max_width=_WIDEST)).minimum
+    if needed > out.width:
+        out = Console(width=needed, highlight=False)
+    out.print(table)
+
+
+def console() -> Console:
+    """Return a Rich console on standard output, wide enough for a table in a pipe."""
+    from rich.console import Console
+
+    return Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False)
+
+
+@contextmanager
+def progress(description: str, total: int) -> Iterator[Callable[[int], None]]:
+    """Show a bar on a terminal, nothing in a pipe; yield what advances it."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    err = Console(stderr=True)
+    with Progress(console=err, transient=True, disable=not sys.stderr.isatty()) as bar:
+        task = bar.add_task(description, total=total)
+        yield lambda steps: bar.advance(task, steps)
+
+
+def tell(message: str) -> None:
+    """Write one line to standard error."""
+    typer.echo(f"mdfconv: {message}", err=True)
+
+
+def _flat(cell: Any) -> Any:
+    """Return a cell as a single value: nothing is empty, several numbers are one text."""
+    if cell is None:
+        return ""
+    if isinstance(cell, Mapping):
+        return "; ".join(f"{key}: {_flat(value)}" for key, value in cell.items())
+    if isinstance(cell, list | tuple):
+        separator = "; " if any(isinstance(value, str) for value in cell) else ","
+        return separator.join(str(value) for value in cell)
+    return cell
+
+
+def _plain_cell(cell: Any) -> str:
+    return number_text(cell) if isinstance(cell, float) else str(cell)

@@ -1,0 +1,218 @@
+"""`convert`: arrays of parameters from one distribution to another."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from mdfconv.conversion.endpoint import Endpoint, endpoints
+from mdfconv.conversion.equivalence import exact_route, follow
+from mdfconv.conversion.method import Method
+from mdfconv.conversion.methods import default_method, method_named
+from mdfconv.conversion.refusals import check_covered, check_pair, unreachable
+from mdfconv.distributions.evaluation import Array, as_operand
+from mdfconv.distributions.parameter import number_text
+from mdfconv.errors import MdfconvError, MdfconvWarning
+from mdfconv.fitting.metrics import Metric, metric_named
+
+FREE: Literal["free"] = "free"
+Gamma: TypeAlias = float | Literal["free"] | None
+
+
+def convert(
+    values: Any,
+    source: str | Endpoint,
+    target: str | Endpoint,
+    method: str | None = None,
+    *,
+    metric: str | Metric = "unit",
+    gamma: Gamma = None,
+) -> Any:
+    """Convert a parameter from one distribution to another.
+
+    Parameters
+    ----------
+    values : array_like or tuple of two array_like
+        Parameters of the source; a tuple (x, y) is the pair of an anisotropic surface.
+    source, target : str
+        Distribution, with an encoding after a colon: ``"ggx:roughness"`` (α = r²),
+        ``"ggx:glossiness"`` (α = (1−g)²).
+    method : str, optional
+        ``"closed-form"``, ``"half-angle"``, ``"ward"``, ``"peak"``, ``"fit"`` or ``"fast"``,
+        which is the fit within 1e-6 (display: 1e-4) at the price of a closed form. If not
+        given the closed form, or the fit of a pair that has none.
+    metric : str or Metric
+        What ``"fit"`` and ``"fast"`` keep: ``"unit"`` (the shape of the lobe), ``"energy"``
+        (the light) or ``"display"`` (the picture on a screen; ``"display:4"`` at exposure 4, 1
+        puts the source's peak at white).
+    gamma : float or "free", optional
+        The second parameter, on either side that has one; its default if not given. ``"free"``
+        fits that of the target along with the first.
+
+    Returns
+    -------
+    float, numpy.ndarray or tuple
+        Parameters of the target, in the shape and the floating type of the values. With
+        ``"fast"`` elements of an array that are illegal or outside its range are NaN. With a
+        free γ a tuple: parameters, and γ.
+
+    Raises
+    ------
+    MdfconvError
+        If a name is unknown, a value illegal, the pair not covered by the method, or a
+        result outside the target's legal range. It is a ValueError.
+
+    Warns
+    -----
+    MdfconvWarning
+        Once, if elements of an array came back as NaN.
+
+    Examples
+    --------
+    >>> convert(0.2, "beckmann", "ggx")
+    0.23552
+    >>> convert([100, 1000], "blinn-phong", "ggx", method="half-angle").round(4)
+    array([0.1794, 0.0577])
+    """
+    ends = endpoints(source, target, None if gamma == FREE else gamma)
+    rule = chosen_method(method, *ends, gamma)
+    kept = metric_named(metric)
+    if not isinstance(values, tuple):
+        operand = as_operand(values)
+        if gamma == FREE:
+            results = apply_free(kept, ends[0].decode(operand), *ends)
+            return tuple(_like(array, operand) for array in results[:2])
+        return _convert(operand, rule, kept, *ends)
+    check_pair(values, *ends)
+    x, y = (as_operand(axis) for axis in values)
+    try:
+        np.broadcast_shapes(np.shape(x), np.shape(y))
+    except ValueError:
+        raise MdfconvError(f"shapes {np.shape(x)} and {np.shape(y)} are not a pair") from None
+    return _convert(x, rule, kept, *ends), _convert(y, rule, kept, *ends)
+
+
+def chosen_method(name: str | None, source: Endpoint, target: Endpoint, gamma: Gamma) -> Method:
+    """Return the method that was asked for, or the one that a pair gets without a choice.
+
+    Raises
+    ------
+    MdfconvError
+        If the name is not known, or γ is free and cannot be for the target or the method.
+    """
+    if gamma != FREE:
+        pair = source.distribution, target.distribution
+        return default_method(*pair) if name is None else method_named(name)
+    if target.distribution.second_parameter is None:
+        raise MdfconvError(f"{target.distribution.name} has one parameter and no γ to fit")
+    method = method_named("fit" if name is None else name)
+    if method.name != "fit":
+        raise MdfconvError(f"{method.name} takes γ as it is", "fit finds it")
+    return method
+
+
+def apply(
+    method: Method, metric: Metric, parameter: Array, source: Endpoint, target: Endpoint
+) -> Array:
+    """Convert legal parameters; raise unless every result is legal and can be stored."""
+    exact = exact_route(source.distribution, target.distribution)
+    with np.errstate(all="ignore"):
+        if exact is not None:
+            result = np.asarray(follow(exact, parameter))
+        else:
+            check_covered(method, metric, source, target)
+            pair = source.distribution, target.distribution
+            result = np.asarray(method.convert(parameter, *pair, metric))
+    _check_results(method, metric, parameter, result, source, target)
+    return result
+
+
+def apply_free(
+    metric: Metric, parameter: Array, source: Endpoint, target: Endpoint
+) -> tuple[Array, Array, Array]:
+    """Fit both parameters of the target to legal parameters.
+
+    Returns
+    -------
+    stored, gamma : numpy.ndarray
+        The stored values, and γ.
+    at_limit : numpy.ndarray of bool
+        Where γ is at the end of the range in which it is looked for.
+    """
+    from mdfconv.fitting.free_gamma import fit_free_gamma
+
+    fits = fit_free_gamma(source.distribution, parameter.ravel(), target.distribution, metric)
+    result, gamma, at_limit = (
+        array.reshape(parameter.shape) for array in (fits.parameter, fits.gamma, fits.at_limit)
+    )
+    _check_results(method_named("fit"), metric, parameter, result, source, target)
+    return target.encode(result), gamma, at_limit
+
+
+def _check_results(
+    method: Method,
+    metric: Metric,
+    parameter: Array,
+    result: Array,
+    source: Endpoint,
+    target: Endpoint,
+) -> None:
+    legal = target.distribution.parameter.accepts(result) & ~np.isnan(target.encode(result))
+    if not legal.all():
+        index = int(np.argmin(legal))
+        raise unreachable(method, metric, parameter, result, index, source, target)
+
+
+def _convert(
+    operand: Any, method: Method, metric: Metric, source: Endpoint, target: Endpoint
+) -> Any:
+    """Convert an operand, in its shape and floating type."""
+    if method.gaps_as_nan and np.ndim(operand):
+        stored = _apply_with_gaps(method, metric, operand, source, target)
+    else:
+        stored = target.encode(apply(method, metric, source.decode(operand), source, target))
+    return _like(stored, operand)
+
+
+def _like(result: Array, operand: Any) -> Any:
+    """Return results in the floating type of the operand that they came from."""
+    if isinstance(operand, float):
+        return float(result)
+    dtype = operand.dtype if operand.dtype.kind == "f" else np.dtype(np.float64)
+    with np.errstate(over="ignore"):
+        cast = result.astype(dtype)
+    if np.isinf(cast).any():
+        raise MdfconvError(f"a result is too large for {dtype.name}: convert in float64")
+    return cast[()]
+
+
+def _apply_with_gaps(
+    method: Method, metric: Metric, operand: Array, source: Endpoint, target: Endpoint
+) -> Array:
+    """Convert an array; NaN, with one warning, where there is no answer."""
+    values = np.asarray(operand, dtype=np.float64)
+    exact = exact_route(source.distribution, target.distribution)
+    if exact is None:
+        check_covered(method, metric, source, target)
+    with np.errstate(all="ignore"):
+        parameter = source.decode_legal(values)
+        if exact is not None:
+            result = follow(exact, parameter)
+        else:
+            pair = source.distribution, target.distribution
+            result = method.convert(parameter, *pair, metric)
+    stored = target.encode(result)
+    answered = target.distribution.parameter.accepts(result) & ~np.isnan(stored)
+    if answered.all():
+        return stored
+    first = int(np.argmin(answered))
+    missing = answered.size - int(np.count_nonzero(answered))
+    warnings.warn(
+        f"{missing} of {values.size} values have no answer by {method.name} from {source.label} "
+        f"to {target.label} and are NaN, the first is {number_text(float(values.flat[first]))}",
+        MdfconvWarning,
+        stacklevel=4,
+    )
+    return np.where(answered, stored, np.nan)

@@ -1,0 +1,222 @@
+"""`explain`: conversions with their route, the error that remains, and caveats."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from mdfconv.conversion.arrays import FREE, Gamma, apply, apply_free, chosen_method
+from mdfconv.conversion.endpoint import Endpoint, endpoints
+from mdfconv.conversion.equivalence import exact_route
+from mdfconv.conversion.method import Method
+from mdfconv.conversion.refusals import check_pair
+from mdfconv.conversion.remaining_error import remaining_error
+from mdfconv.distributions.evaluation import Array, as_operand
+from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric, metric_named
+
+Value: TypeAlias = float | tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """One converted value, with its error and what a careful user must know.
+
+    Parameters
+    ----------
+    source, target : str
+        Distribution and encoding, such as ``"ggx:roughness"``.
+    value, result : float or tuple of two floats
+        What was converted, and to what; a pair for an anisotropic surface.
+    gamma : float or None
+        γ of the target, if it has a second parameter.
+    method, metric : str
+        The method used, and the metric of the errors (and of the method, if it is "fit").
+    exact : bool
+        Whether the target is the same lobe, so that no error remains.
+    keeps : str
+        What the conversion keeps, to follow the word "keeps"; "" if it is exact.
+    route : tuple of str
+        The formulas or conditions applied, in order.
+    rmse, max_error : float
+        Root mean square and maximum difference, in the metric and relative to the source's
+        peak, on β from 0 to 4.8 β_half of the source, at most π/2; for a pair those of the
+        worse axis.
+    cautions : tuple of str
+        What this value in particular calls for.
+    """
+
+    source: str
+    target: str
+    value: Value
+    result: Value
+    gamma: float | None
+    method: str
+    metric: str
+    exact: bool
+    keeps: str
+    route: tuple[str, ...]
+    rmse: float
+    max_error: float
+    cautions: tuple[str, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The cautions, what the method keeps, and the route, as sentences."""
+        by = (f"by {', '.join(self.route)}",) if self.route else ()
+        if self.exact:
+            return ("exact: the same form", *by)
+        return (*self.cautions, f"keeps the {self.keeps}", *by)
+
+
+def explain(
+    values: Any,
+    source: str | Endpoint,
+    target: str | Endpoint,
+    method: str | None = None,
+    *,
+    metric: str | Metric = "unit",
+    gamma: Gamma = None,
+    errors: bool = True,
+) -> list[Conversion]:
+    """Convert, and say for each value by which route, with which error and caveats.
+
+    Parameters
+    ----------
+    values : number, tuple of two numbers, list of either, or numpy.ndarray
+        Parameters of the source; a tuple (x, y) is the pair of an anisotropic surface.
+    source, target, method, metric, gamma
+        As for `convert`.
+    errors : bool
+        False saves the cost of `rmse` and `max_error`, which are then NaN.
+
+    Returns
+    -------
+    list of Conversion
+        One for each value.
+
+    Raises
+    ------
+    MdfconvError
+        As `convert`.
+    """
+    ends = endpoints(source, target, None if gamma == FREE else gamma)
+    rule, kept = chosen_method(method, *ends, gamma), metric_named(metric)
+    axes = _axes(values, *ends)
+    parameter = ends[0].decode([value for pair in axes for value in pair])
+    table = _Table(rule, kept, parameter, *ends, free=gamma == FREE, errors=errors)
+    return [table.conversion(pair, rows) for pair, rows in _with_rows(axes)]
+
+
+def _axes(values: Any, source: Endpoint, target: Endpoint) -> list[tuple[Any, ...]]:
+    """Return the values as tuples of one number, or of two."""
+    items = values if isinstance(values, list) else [values]
+    if isinstance(values, np.ndarray):
+        items = as_operand(values).ravel().tolist()
+    axes = [item if isinstance(item, tuple) else (item,) for item in items]
+    for pair in axes:
+        if len(pair) != 1:
+            check_pair(pair, source, target)
+        if any(np.ndim(as_operand(value)) for value in pair):
+            raise MdfconvError("explain takes numbers and pairs of numbers, not arrays in a list")
+    return axes
+
+
+def _with_rows(axes: Sequence[tuple[Any, ...]]) -> Iterator[tuple[tuple[Any, ...], slice]]:
+    """Yield each value with its rows in the array of all numbers."""
+    start = 0
+    for pair in axes:
+        yield pair, slice(start, start + len(pair))
+        start += len(pair)
+
+
+class _Table:
+    """The conversions of an array of parameters, column by column."""
+
+    def __init__(
+        self,
+        method: Method,
+        metric: Metric,
+        parameter: Array,
+        source: Endpoint,
+        target: Endpoint,
+        *,
+        free: bool,
+        errors: bool,
+    ) -> None:
+        self._method, self._metric, self._source, self._target = method, metric, source, target
+        self._parameter = parameter
+        pair = source.distribution, target.distribution
+        exact = None if free else exact_route(*pair)
+        self._exact = exact is not None
+        own_steps = (
+            method.route(*pair) if exact is None else [step.text for step in exact if step.text]
+        )
+        encodings = [end.encoding.formula if end.encoding else "" for end in (source, target)]
+        steps = [encodings[0], *(own_steps or ()), encodings[1]]
+        self._route = tuple(step for step in steps if step)
+        self._gamma: Array | None = None
+        self._at_limit = np.zeros(parameter.shape, bool)
+        if free:
+            self._stored, self._gamma, self._at_limit = apply_free(
+                metric, parameter, source, target
+            )
+            self._result = target.decode(self._stored)
+        else:
+            self._result = apply(method, metric, parameter, source, target)
+            self._stored = target.encode(self._result)
+            if pair[1].second_parameter:
+                self._gamma = np.full(parameter.shape, pair[1].gamma)
+        self._errors = (
+            self._remaining(free=free) if errors else (np.full_like(parameter, np.nan),) * 2
+        )
+
+    def _remaining(self, *, free: bool) -> tuple[Array, Array]:
+        """Return the RMSE and the maximum error, shapes (n,)."""
+        pair = self._source.distribution, self._target.distribution
+        if not self._exact and not free:
+            return self._method.remaining_error(
+                self._parameter, pair[0], self._result, pair[1], self._metric
+            )
+        gamma = self._gamma if free else None
+        return remaining_error(
+            pair[0], self._parameter, pair[1], self._result, self._metric, gamma=gamma
+        )
+
+    def conversion(self, pair: tuple[Any, ...], rows: slice) -> Conversion:
+        """Return the conversion of one value."""
+        rmse, max_error = (float(column[rows].max()) for column in self._errors)
+        return Conversion(
+            source=self._source.label,
+            target=self._target.label,
+            value=_value([float(value) for value in pair]),
+            result=_value(self._stored[rows].tolist()),
+            gamma=None if self._gamma is None else float(self._gamma[rows][0]),
+            method=self._method.name,
+            metric=str(self._metric),
+            exact=self._exact,
+            keeps="" if self._exact else self._method.keeps(self._metric),
+            route=self._route,
+            rmse=rmse,
+            max_error=max_error,
+            cautions=() if self._exact else self._cautions(rows),
+        )
+
+    def _cautions(self, rows: slice) -> tuple[str, ...]:
+        pair = self._source.distribution, self._target.distribution
+        axes = zip(self._parameter[rows].tolist(), self._result[rows].tolist(), strict=True)
+        cautions = [text for axis in axes for text in self._method.cautions(*axis, *pair)]
+        if self._at_limit[rows].any():
+            low, high = pair[1].parameters[1].fit_range
+            cautions.append(
+                f"γ of {pair[1].name} is at the end of the range in which it is looked for, "
+                f"{low:g} to {high:g}"
+            )
+        return tuple(dict.fromkeys(cautions))
+
+
+def _value(axes: list[float]) -> Value:
+    return (axes[0], axes[1]) if len(axes) > 1 else axes[0]

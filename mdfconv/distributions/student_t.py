@@ -1,0 +1,156 @@
+"""The Student-t distribution of slopes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mdfconv.distributions.base import Distribution
+from mdfconv.distributions.declarations import Equivalent, Printed, inverse_square_over_pi, same
+from mdfconv.distributions.evaluation import (
+    Array,
+    inverse_square,
+    negative_log_tail,
+    tangent_square,
+)
+from mdfconv.distributions.parameter import Parameter
+
+# tan²β of an angle that no double tells from π/2.
+_LARGEST_SQUARE = 1e34
+
+
+def _printed_unit(beta: Any, alpha: Any, gamma: Any) -> Any:
+    square = np.tan(beta) ** 2
+    value = (gamma - 1) ** gamma * alpha ** (2 * gamma)
+    value = value / (np.cos(beta) ** 4 * ((gamma - 1) * alpha**2 + square) ** gamma)
+    off_axis = 2 * (gamma - 1) * alpha**2 > gamma
+    top = np.where(off_axis, (2 * (gamma - 1) * alpha**2 - gamma) / (gamma - 2), 0)
+    maximum = (1 + top) ** 2 * (1 + top / ((gamma - 1) * alpha**2)) ** -gamma
+    return np.where(off_axis, value / maximum, value)
+
+
+class StudentT(Distribution):
+    """Slopes with the tails of a Student-t distribution: Ribardière et al. 2017.
+
+    With t = tan β and x = t²/((γ−1) α²)::
+
+        D̄ = (1+t²)² (1 + x)^(−γ),   F = 1 − (1 + x)^(1−γ),
+
+    the unit form divided by its maximum where α² > γ/(2(γ−1)), from where on that lies at
+    t² = (2(γ−1)α² − γ)/(γ−2). Normalized by 1/(π α²). γ = 2 is GGX and γ → ∞ Beckmann; below 2
+    D is unbounded at grazing. The printed (γ−1)^γ α^(2γ−2) / (π cos⁴β ((γ−1) α² + t²)^γ)
+    overflows where γ is large; here only ln(1+x) is multiplied by γ.
+    """
+
+    name = "student-t"
+    aliases = ("t-distribution",)
+    unit_formula = "(1+tan²β)² (1 + tan²β/((γ−1)α²))^(−γ), over its maximum where α² > γ/(2(γ−1))"
+    normalized_formula = "(γ−1)^γ α^(2γ−2) / (π cos⁴β ((γ−1)α² + tan²β)^γ)"
+    source = "Ribardière et al. 2017"
+    parameters = (
+        Parameter("alpha", "α", (0.01, 0.8)),
+        # Towards γ → ∞ it becomes Beckmann: the tails no longer tell γ.
+        Parameter(
+            "gamma", "γ", (2.0, 10.0), 2.0, lower_closed=True, default=2.0, fit_range=(2.0, 512.0)
+        ),
+    )
+    operations = 26
+    scales_with_slope = True
+    printed = Printed(
+        _printed_unit,
+        inverse_square_over_pi,
+        from_cosine=lambda c, gamma: (
+            np.tan(np.arccos(c)) / np.sqrt((gamma - 1) * ((2 / c**4) ** (1 / gamma) - 1))
+        ),
+        peak_alpha=same,
+        from_peak_alpha=same,
+    )
+
+    @property
+    def equivalent(self) -> Equivalent | None:
+        """GGX at γ = 2."""
+        same = "student-t with γ = 2 is ggx"
+        is_ggx = self.gamma == 2
+        return Equivalent("ggx", forward_text=same, backward_text=same) if is_ggx else None
+
+    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
+        # [(1+t²)/(1+x) · (1+x)^(1−½γ)]²: an exponential multiplies the rounding of its exponent, so
+        # that what cancels does so before it; the whole power would underflow at grazing.
+        value = tangent_square(beta, out)
+        x = value * (inverse_square(parameter) / (self.gamma - 1))
+        value += 1
+        if np.size(self.gamma) > 1 or self.gamma != 2:
+            # Finite, so that 0 times its logarithm is 0.
+            power = np.minimum(x, np.finfo(x.dtype).max)
+            np.log1p(power, out=power)
+            power *= 1 - 0.5 * self.gamma
+            np.exp(power, out=power)
+            value *= power
+        x += 1
+        value /= x
+        return np.square(value, out=value)
+
+    def _at_normal(self, parameter: Array) -> Array:
+        return 1 / (np.pi * parameter * parameter)
+
+    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        square = tangent_square(beta)
+        x = square * (inverse_square(parameter) / (self.gamma - 1))
+        value = np.square((1 + square) * np.exp(-0.5 * self.gamma * np.log1p(x)))
+        return value, 2 * self.gamma * x / (1 + x)
+
+    def _log_slope_at_normal(self, parameter: Array) -> Array:
+        return np.full_like(parameter, -2)
+
+    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        x = tangent_square(beta) * (inverse_square(parameter) / (self.gamma - 1))
+        exponent = (1 - self.gamma) * np.log1p(x)
+        return -np.expm1(exponent), np.exp(exponent)
+
+    def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
+        x = np.expm1(negative_log_tail(lobe, tail) / (self.gamma - 1))
+        return np.arctan(parameter * np.sqrt((self.gamma - 1) * x))
+
+    def mode(self, parameter: Array) -> Array:
+        """Return the angle of the maximum, 0 while α² ≤ γ/(2(γ−1))."""
+        return np.arctan(np.sqrt(self._mode_square(parameter)))
+
+    def _mode_square(self, parameter: Array) -> Array:
+        """Return tan²β of the maximum."""
+        with np.errstate(all="ignore"):
+            top = 2 * (self.gamma - 1) * np.square(parameter) - self.gamma
+            square = np.where(top > 0, top / (self.gamma - 2), 0)
+        return np.minimum(square, _LARGEST_SQUARE)
+
+    def _off_axis_maximum(self, parameter: Array) -> Array | None:
+        off_axis = self._mode_square(parameter) > 0
+        if not off_axis.any():
+            return None
+        # With q = (γ−1)α² − 1 the two powers at t² become
+        # (2 (q+1)/γ)² [(γ−2)(q+1)/(γ q)]^(γ−2), which is α⁴ at γ = 2.
+        power = self.gamma - 2
+        q = np.where(off_axis, (self.gamma - 1) * np.square(parameter) - 1, 1)
+        ratio = np.maximum((power - 2 * q) / (self.gamma * q), -1)
+        second = np.where(power > 0, power * np.log1p(np.where(power > 0, ratio, 0)), 0)
+        maximum = np.square(2 * (q + 1) / self.gamma) * np.exp(second)
+        return np.where(off_axis, maximum, 1)
+
+    def _log_slope_off_axis(self, parameter: Array) -> Array:
+        x = self._mode_square(parameter) * (inverse_square(parameter) / (self.gamma - 1))
+        return 2 * self.gamma * x / (1 + x)
+
+    def _from_half_tangent(self, tangent: Array) -> Array:
+        # (1+x)^γ = 2 (1+t²)²
+        square = np.square(tangent)
+        x = np.expm1((np.log(2) + 2 * np.log1p(square)) / self.gamma)
+        return tangent / np.sqrt((self.gamma - 1) * x)
+
+    def _peak_alpha(self, parameter: Array) -> Array:
+        return parameter
+
+    def _from_peak_alpha(self, alpha: Array) -> Array:
+        return alpha
+
+
+DISTRIBUTION = StudentT()

@@ -1,0 +1,84 @@
+"""What every metric has in common."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar, Self
+
+import numpy as np
+
+from mdfconv.distributions import Distribution
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+
+
+class Metric(ABC):
+    """A squared distance ∫ (S(D_t/P) − S(D_s/P))² w dβ over [0, π/2], P = max D_s.
+
+    Attributes
+    ----------
+    keeps, quantity : str
+        What a fit under the metric keeps, and what its signal S is, in words.
+    word : str
+        What it keeps, in one word.
+    normalized : bool
+        Whether D is the normalized or the unit form.
+    kinks : tuple of float
+        Values of D/P at which S is not smooth.
+    setting : str
+        What may follow the name and a colon, in a word; "" for nothing.
+    """
+
+    name: ClassVar[str]
+    keeps: ClassVar[str]
+    word: ClassVar[str]
+    quantity: ClassVar[str]
+    normalized: ClassVar[bool]
+    kinks: tuple[float, ...] = ()
+    setting: ClassVar[str] = ""
+
+    @classmethod
+    def with_setting(cls, text: str) -> Self:
+        """Return the metric for the setting that follows its name and a colon.
+
+        Raises
+        ------
+        MdfconvError
+            If the metric has none, or the text does not say one.
+        """
+        raise MdfconvError(f"the {cls.name} metric has no setting '{text}'")
+
+    def __str__(self) -> str:
+        """Return the name, with the setting where it is not the usual one."""
+        return self.name
+
+    @abstractmethod
+    def weight(self, beta: Array) -> Array:
+        """Return w at an angle, radians."""
+
+    def encode(self, value: Array) -> Array:
+        """Return S for D/P."""
+        return value
+
+    def encode_slope(self, value: Array) -> Array | float:
+        """Return dS/d(D/P)."""
+        return 1.0
+
+    def signal(
+        self, distribution: Distribution, beta: Array, parameter: Array, peak: Array
+    ) -> Array:
+        """Return S of a distribution for P = `peak`; `beta` has the shape of the result."""
+        with np.errstate(all="ignore"):
+            value = distribution.shape(beta, parameter)
+            value *= distribution.maximum(parameter, normalized=self.normalized) / peak
+        return self.encode(value)
+
+    def signal_and_slope(
+        self, distribution: Distribution, beta: Array, parameter: Array, peak: Array
+    ) -> tuple[Array, Array]:
+        """Return S and ∂S/∂ ln p; `beta` has shape (n, k), `parameter` p and `peak` (n, 1)."""
+        value, slope = distribution.with_slope(beta, parameter, normalized=self.normalized)
+        if self.normalized:
+            value /= peak
+            slope *= self.encode_slope(value) / peak
+        return self.encode(value), slope

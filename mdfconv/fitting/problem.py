@@ -1,0 +1,122 @@
+"""The squared distance between two distributions as a function of the target's parameter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mdfconv.distributions import Distribution
+from mdfconv.distributions.evaluation import Array, Indices
+from mdfconv.fitting.level import level_crossing
+from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.quadrature import LobeQuadrature, Quadrature
+
+# An encoding for a screen rises like a root where a distribution leaves 0: panels that shrink
+# by 4 towards the edge resolve it to 1e-6 of the lobe.
+_TOWARDS_EDGE = 1 - np.append(0.25 ** np.arange(1, 10), 0)
+# Beyond this tan β_half (87°), or without a β_half, a lobe is as wide as the hemisphere.
+_WIDEST_TANGENT = 20.0
+
+
+class Problem:
+    """A batch of fits: the distance of each, and its slope in ln p.
+
+    Parameters
+    ----------
+    source : Distribution
+        The distribution that is replaced.
+    parameter : numpy.ndarray, shape (n,)
+        Its legal parameters.
+    target : Distribution
+        What takes its place, with parameters p.
+    metric : Metric
+        What the distance measures.
+    quadrature : Quadrature, optional
+        Where it is sampled; by default the whole hemisphere.
+    rows : numpy.ndarray of int, shape (m,)
+        Which of the n problems make the batch.
+
+    Attributes
+    ----------
+    tangent : numpy.ndarray, shape (m,)
+        tan β_half of the source, at most that of a lobe as wide as the hemisphere.
+    """
+
+    def __init__(
+        self,
+        source: Distribution,
+        parameter: Array,
+        target: Distribution,
+        metric: Metric,
+        quadrature: Quadrature | None,
+        rows: Indices,
+    ) -> None:
+        self.target, self.metric = target, metric
+        self._source = source
+        self._source_parameter = parameter[rows][:, None]
+        tangent = source.half_tangent(parameter[rows])
+        self.tangent = np.where(tangent < _WIDEST_TANGENT, tangent, _WIDEST_TANGENT)
+        self._peak = source.maximum(self._source_parameter, normalized=metric.normalized)
+        if quadrature is None:
+            self._quadrature: Quadrature = LobeQuadrature(np.arctan(self.tangent))
+            self._rows: Indices = np.arange(rows.size)
+        else:
+            self._quadrature, self._rows = quadrature, rows
+        self._source_breaks = self._breaks(source, self._source_parameter, self._peak)
+        # Unless the panels move with the target, all distances share their samples.
+        self._samples: tuple[Array, Array, Array] | None = None
+        if target.edge(np.ones(1)) is None and not metric.kinks:
+            self._samples = self._sampled(np.arange(rows.size), self._source_breaks)
+
+    @property
+    def size(self) -> int:
+        """The number of problems in the batch."""
+        return self._rows.size
+
+    def coarse_distance(self, candidates: Array) -> Array:
+        """Return the approximate distance for each candidate p, shape (m, c)."""
+        beta, weight = self._quadrature.coarse(self._rows, fine=bool(self.metric.kinks))
+        weight = weight * self.metric.weight(beta)
+        signal = self.metric.signal(self._source, beta, self._source_parameter, self._peak)
+        shape = (*candidates.shape, beta.shape[1])
+        residual = self.metric.signal(
+            self.target,
+            np.broadcast_to(beta[:, None, :], shape),
+            candidates[:, :, None],
+            self._peak[:, :, None],
+        )
+        residual -= signal[:, None, :]
+        return np.einsum("ik,ijk,ijk->ij", weight, residual, residual)
+
+    def distance(self, log_parameter: Array, index: Indices) -> tuple[Array, Array]:
+        """Return the distance and half its slope in ln p, for some problems of the batch."""
+        parameter, peak = np.exp(log_parameter)[:, None], self._peak[index]
+        if self._samples is None:
+            breaks = [self._source_breaks[index], self._breaks(self.target, parameter, peak)]
+            beta, weight, signal = self._sampled(index, np.concatenate(breaks, axis=1))
+        else:
+            beta, weight, signal = (array[index] for array in self._samples)
+        value, slope = self.metric.signal_and_slope(self.target, beta, parameter, peak)
+        value -= signal
+        weighted = weight * value
+        return np.einsum("ij,ij->i", weighted, value), np.einsum("ij,ij->i", weighted, slope)
+
+    def _sampled(self, index: Indices, breaks: Array) -> tuple[Array, Array, Array]:
+        """Return angles, weights and the source's signal."""
+        beta, weight = self._quadrature.nodes(self._rows[index], breaks)
+        parameter = self._source_parameter[index]
+        signal = self.metric.signal(self._source, beta, parameter, self._peak[index])
+        return beta, weight * self.metric.weight(beta), signal
+
+    def _breaks(self, distribution: Distribution, parameter: Array, peak: Array) -> Array:
+        """Return the angles where the signal is not smooth, shape (n, any); 0 for none."""
+        edge = distribution.edge(parameter)
+        breaks = [np.zeros_like(parameter) if edge is None else edge * _TOWARDS_EDGE]
+        maximum = distribution.maximum(parameter, normalized=self.metric.normalized)
+        mode = distribution.mode(parameter)
+        for kink in self.metric.kinks:
+            level = kink * peak / maximum
+            ends = [(mode, np.full_like(mode, 0.5 * np.pi))]
+            if np.any(mode > 0):
+                ends.append((mode, np.zeros_like(mode)))
+            breaks += [level_crossing(distribution, parameter, level, *end) for end in ends]
+        return np.concatenate(breaks, axis=1)

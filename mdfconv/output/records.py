@@ -1,0 +1,57 @@
+"""Records as text: JSON, CSV and Markdown."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+Record = Mapping[str, Any]
+
+
+def json_text(records: Any) -> str:
+    """Return records as indented JSON; NaN and infinities become null."""
+    return json.dumps(_finite(records), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def csv_text(columns: Sequence[str], rows: Iterable[Record]) -> str:
+    """Return rows as CSV with a header; floats keep their full precision."""
+    buffer = io.StringIO()
+    writer = csv.DictWriter(buffer, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return buffer.getvalue().rstrip("\n")
+
+
+def cell_text(value: Any) -> str:
+    """Return a cell for people: six significant digits, and a mark for yes."""
+    if isinstance(value, bool):
+        return "✓" if value else ""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def rounded_rows(columns: Mapping[str, Any]) -> list[dict[str, float]]:
+    """Return arrays of one length as rows, to nine digits: what a curve's file needs."""
+    table = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [
+        {name: float(f"{value:.9g}") for name, value in zip(columns, row, strict=True)}
+        for row in table
+    ]
+
+
+def markdown_text(columns: Sequence[str], rows: Sequence[Record]) -> str:
+    """Return rows as a Markdown table, numbers as `cell_text` writes them."""
+    lines = [columns, ["---"] * len(columns)]
+    lines += [[cell_text(row[column]) for column in columns] for row in rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -1,0 +1,154 @@
+"""The paper's closed forms as what they are: fits to Table 2, redone under every metric."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from mdfconv.distributions.evaluation import Array
+from mdfconv.fitting.metrics import Metric
+from mdfconv.paper.table2 import fit_table, paper_sweep
+
+Shape = Callable[..., Array]
+
+
+@dataclass(frozen=True)
+class Form:
+    """The shape of a printed formula, with its coefficients.
+
+    Parameters
+    ----------
+    source, target : str
+        The distributions.
+    text : str
+        The formula with letters for its coefficients.
+    shape : callable
+        ``shape(x, *coefficients)``.
+    printed : tuple of float
+        The paper's coefficients.
+    """
+
+    source: str
+    target: str
+    text: str
+    shape: Shape
+    printed: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A formula refitted to the table of a metric.
+
+    Parameters
+    ----------
+    form : Form
+        The formula.
+    metric : str
+        The metric of the table.
+    coefficients : tuple of float
+        Least squares of the relative error over the 17 rows.
+    printed_error, error : float
+        The worst relative error over the rows, with the printed coefficients and with these.
+    """
+
+    form: Form
+    metric: str
+    coefficients: tuple[float, ...]
+    printed_error: float
+    error: float
+
+
+def _inverse_square(x: Array, a: float, b: float) -> Array:
+    return a / x**2 - b
+
+
+def _root(x: Array, a: float, b: float) -> Array:
+    return np.sqrt(a) / np.sqrt(x + b)
+
+
+def _odd(x: Array, a: float, b: float) -> Array:
+    return a * x + b * x**3
+
+
+FORMS: Sequence[Form] = (
+    Form("beckmann", "blinn-phong", "N = a/m_B² − b", _inverse_square, (2, 2.5)),
+    Form("blinn-phong", "beckmann", "m_B = √a/√(N+b)", _root, (2, 2.5)),
+    Form("beckmann", "gauss", "m_G = m_B + a m_B³", lambda x, a: x + a * x**3, (0.5591,)),
+    Form("gauss", "beckmann", "m_B = m_G − a m_G³", lambda x, a: x - a * x**3, (0.4134,)),
+    Form("gauss", "blinn-phong", "N = a/m_G² − b", _inverse_square, (2, 0.5)),
+    Form("blinn-phong", "gauss", "m_G = √a/√(N+b)", _root, (2, 0.5)),
+    Form("blinn-phong", "sawicki", "N_DS = a N + b", lambda x, a, b: a * x + b, (1.174, 0.3)),
+    Form("sawicki", "blinn-phong", "N = (N_DS − b)/a", lambda x, a, b: (x - b) / a, (1.174, 0.3)),
+    Form("ggx", "gauss", "m_G = a C + b C³", _odd, (0.8222, 0.82)),
+    Form(
+        "ggx", "beckmann", "m_B = a C + b C⁴", lambda x, a, b: a * x + b * x**4, (0.8388, 0.7)
+    ),
+    Form(
+        "ggx", "blinn-phong", "N = a²/C² − b", lambda x, a, b: (a / x) ** 2 - b, (1.696, 4.5)
+    ),
+    Form("gauss", "ggx", "C = a m_G + b m_G³", _odd, (1.186, -0.835)),
+    Form("beckmann", "ggx", "C = a m_B + b m_B³", _odd, (1.2, -0.56)),
+    Form("blinn-phong", "ggx", "C = a/√(N+b)", lambda x, a, b: a / np.sqrt(x + b), (1.697, 4.5)),
+)  # fmt: skip
+
+_COLUMNS = {
+    "beckmann": "m_b",
+    "blinn-phong": "n",
+    "gauss": "m_g",
+    "sawicki": "n_ds",
+    "ggx": "c_tr",
+}
+
+
+def refit(metric: Metric) -> list[Refit]:
+    """Refit every printed formula to the table of a metric over the paper's sweep.
+
+    Parameters
+    ----------
+    metric : Metric
+        Unit gives the table that the paper's own coefficients were fitted to.
+    """
+    rows = fit_table(*paper_sweep(), metric)
+    table = {name: np.array([row[key] for row in rows]) for name, key in _COLUMNS.items()}
+    return [_refit_one(form, metric, table[form.source], table[form.target]) for form in FORMS]
+
+
+def refit_rows(metrics: Sequence[Metric]) -> list[dict[str, Any]]:
+    """Return the refitted formulas under each metric as rows of a table."""
+    return [
+        {
+            "from": refitted.form.source,
+            "to": refitted.form.target,
+            "formula": refitted.form.text,
+            "metric": refitted.metric,
+            "printed": _coefficients(refitted.form.printed),
+            "worst_printed": refitted.printed_error,
+            "refitted": _coefficients(refitted.coefficients),
+            "worst_refitted": refitted.error,
+        }
+        for metric in metrics
+        for refitted in refit(metric)
+    ]
+
+
+def _coefficients(values: Sequence[float]) -> str:
+    return " ".join(f"{value:.6g}" for value in values)
+
+
+def _refit_one(form: Form, metric: Metric, x: Array, y: Array) -> Refit:
+    def relative(coefficients: Array) -> Array:
+        return form.shape(x, *coefficients) / y - 1
+
+    with np.errstate(invalid="ignore"):
+        best = least_squares(relative, form.printed, x_scale="jac", xtol=1e-14, ftol=1e-14).x
+    return Refit(
+        form=form,
+        metric=str(metric),
+        coefficients=tuple(best.tolist()),
+        printed_error=float(np.max(np.abs(relative(np.array(form.printed))))),
+        error=float(np.max(np.abs(relative(best)))),
+    )

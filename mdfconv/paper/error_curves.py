@@ -1,0 +1,121 @@
+"""Curves of distributions and of their error against one of them: Figures 1 and 2."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mdfconv.conversion import convert
+from mdfconv.conversion.remaining_error import lobe_extent
+from mdfconv.distributions import distribution
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric
+from mdfconv.output.records import csv_text, rounded_rows
+
+# Sawicki 2021, captions of Figures 1 and 2.
+PAPER_SETS: Mapping[str, Mapping[str, float]] = {
+    "fig1": {
+        "beckmann": 0.4, "blinn-phong": 10, "gauss": 0.4364, "ggx": 0.4456, "sawicki": 12.04,
+        "schlick": 0.4,
+    },
+    "fig2": {
+        "beckmann": 0.04464, "blinn-phong": 1000, "gauss": 0.04471, "ggx": 0.05354,
+        "sawicki": 1174.3, "schlick": 0.04464,
+    },
+}  # fmt: skip
+DRAWN = ("blinn-phong", "gauss", "ggx", "sawicki", "schlick")
+_MOST_POINTS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Distributions against β, and their error.
+
+    Parameters
+    ----------
+    parameters : dict
+        From names to parameters, the reference first.
+    beta : numpy.ndarray, shape (n,)
+        Angles, radians.
+    values : dict
+        From names to the metric's signal: D̄ for the unit metric.
+    quantity : str
+        What the values are, for an axis.
+    errors : dict
+        From names but the reference's to (signal − reference)/max reference.
+    """
+
+    parameters: Mapping[str, float]
+    beta: Array
+    values: Mapping[str, Array]
+    quantity: str
+    errors: Mapping[str, Array]
+
+    @property
+    def reference(self) -> str:
+        """The name of the distribution that the others are compared with."""
+        return next(iter(self.parameters))
+
+    def error_text(self) -> str:
+        """Return the errors as CSV: beta_rad, then a column a distribution."""
+        columns = {"beta_rad": self.beta, **self.errors}
+        return csv_text(list(columns), rounded_rows(columns))
+
+    def maxima(self) -> list[dict[str, Any]]:
+        """Return for each distribution the largest |error| and where it occurs."""
+        rows = []
+        for name, error in self.errors.items():
+            index = int(np.argmax(np.abs(error)))
+            rows.append(
+                {
+                    "distribution": name,
+                    "parameter": float(self.parameters[name]),
+                    "max_error_percent": 100 * float(abs(error[index])),
+                    "beta_rad": float(self.beta[index]),
+                }
+            )
+        return rows
+
+
+def parameters_for(
+    m_b: float, names: Sequence[str], method: str | None, metric: Metric
+) -> dict[str, float]:
+    """Return the parameters of distributions converted from Beckmann's m_B."""
+    return {name: float(convert(m_b, "beckmann", name, method, metric=metric)) for name in names}
+
+
+def curves(parameters: Mapping[str, float], reference: str, metric: Metric, points: int) -> Curves:
+    """Evaluate distributions on a range of β that follows the reference's lobe.
+
+    Parameters
+    ----------
+    parameters : dict
+        From names to parameters; the reference is among them.
+    reference : str
+        The distribution to compare with.
+    metric : Metric
+        Unit compares unit forms, as the paper; others what they compare in a fit.
+    points : int
+        Number of angles, from 0 to 4.8 β_half of the reference, at most π/2.
+    """
+    if not 2 <= points <= _MOST_POINTS:
+        raise MdfconvError(f"the number of points is from 2 to {_MOST_POINTS}")
+    source, parameter = distribution(reference), np.array([parameters[reference]])
+    beta = np.linspace(0, float(lobe_extent(source, parameter)[0]), points)
+    peak = source.maximum(parameter, normalized=metric.normalized)
+    values = {
+        name: metric.signal(distribution(name), beta, np.array([float(parameters[name])]), peak)
+        for name in dict.fromkeys([reference, *parameters])
+    }
+    top = values[reference].max()
+    errors = {
+        name: (value - values[reference]) / top
+        for name, value in values.items()
+        if name != reference
+    }
+    shown = {name: parameters[name] for name in values}
+    return Curves(shown, beta, values, metric.quantity, errors)

@@ -1,0 +1,79 @@
+"""Things with names: looked up as the user writes them, with a hint where that fails."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Generic, TypeVar
+
+from mdfconv.errors import MdfconvError
+
+Item = TypeVar("Item")
+
+_SEPARATORS = str.maketrans("_/ ", "---")
+
+
+class Registry(Generic[Item]):
+    """Items by name and alias, in the order in which they were added.
+
+    Case does not matter in a name, and ``_``, ``/`` and blanks count as ``-``.
+
+    Parameters
+    ----------
+    kind : str
+        What the items are, for messages, such as ``"distribution"``.
+    """
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        self._items: dict[str, Item] = {}
+        self._aliases: dict[str, str] = {}
+
+    def add(self, name: str, item: Item, aliases: Sequence[str] = ()) -> None:
+        """Add an item.
+
+        Raises
+        ------
+        MdfconvError
+            If the name or an alias is taken.
+        """
+        for word in (name, *aliases):
+            if word in self._aliases:
+                raise MdfconvError(f"the {self.kind} '{word}' exists already")
+        self._items[name] = item
+        self._aliases |= dict.fromkeys((name, *aliases), name)
+
+    def __getitem__(self, name: str) -> Item:
+        """Return the item with a name or alias; raise `MdfconvError` if there is none."""
+        if not isinstance(name, str):
+            raise MdfconvError(f"a {self.kind} is named by a string, not {name!r}")
+        key = name.strip().lower().translate(_SEPARATORS)
+        if key not in self._aliases:
+            raise unknown_name(self.kind, name, list(self._aliases))
+        return self._items[self._aliases[key]]
+
+    def __iter__(self) -> Iterator[Item]:
+        return iter(self._items.values())
+
+    @property
+    def names(self) -> list[str]:
+        """The names, without the aliases."""
+        return list(self._items)
+
+
+def unknown_name(kind: str, name: str, known: Sequence[str]) -> MdfconvError:
+    """Return the error for a name that is not known, with the nearest ones that are.
+
+    Parameters
+    ----------
+    kind : str
+        What the name was meant to name, such as ``"distribution"``.
+    name : str
+        The name as the user wrote it.
+    known : sequence of str
+        Every name that would have been accepted.
+    """
+    from difflib import get_close_matches
+
+    near = get_close_matches(name.lower(), known, n=3, cutoff=0.5)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known)}"
+    return MdfconvError(f"unknown {kind} '{name}'", hint)

@@ -1,0 +1,1 @@
+"""Pictures of a sphere with one distribution put in the place of another."""

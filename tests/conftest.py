@@ -1,0 +1,8 @@
+"""One thread for linear algebra, set before NumPy is imported.
+
+The tests run in one process for each processor; more threads would only wait for one another.
+"""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

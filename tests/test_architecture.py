@@ -1,0 +1,105 @@
+"""The house: imports go down only, and what is true of a distribution stands in its class."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import mdfconv
+
+PACKAGE = Path(mdfconv.__file__).parent
+# From the roof to the ground; a module imports from its own floor and those beneath.
+FLOORS = (
+    "cli", "reports", "benchmark", "render", "paper", "scene", "formula", "measured", "conversion",
+    "brdf", "fitting", "output", "distributions", "registry", "errors",
+)  # fmt: skip
+# What speaks to a terminal stands on the roof, alone.
+TERMINAL = {"typer", "rich", "click"}
+# Modules that may name distributions, because they are about those particular ones.
+ABOUT_PARTICULAR_ONES = {
+    "conversion/closed_form.py": "the formulas of Sawicki 2021",
+    "conversion/ward.py": "the rule of Ward 1996",
+    "paper/table2.py": "the columns of the paper's table",
+    "paper/closed_forms.py": "the paper's formulas, refitted",
+    "paper/error_curves.py": "the paper's figures",
+    "reports/paper_pages.py": "the paper's prose",
+    "render/comparison.py": "the names of BRDFs",
+    "brdf/models.py": "the definitions of BRDFs",
+    "brdf/reflection.py": "the definitions of BRDFs",
+    "brdf/microsurface.py": "the sampler of Heitz 2018, which is that of an ellipsoid",
+    "reports/furnace_page.py": "the names of BRDFs",
+    "cli/furnace_command.py": "the names of BRDFs",
+    "cli/compare_command.py": "the names of BRDFs",
+    "scene/shininess.py": "the definition of Wavefront's Ns and Pr",
+    "benchmark/methods.py": "the paper's sweep",
+    "cli/bench_command.py": "the pair that is measured by default",
+    "cli/plot_error_command.py": "the paper's reference",
+    "cli/fit_table_command.py": "the paper's reference",
+}
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+MODULES = [str(path.relative_to(PACKAGE)) for path in SOURCES]
+
+
+def tree_of(module):
+    return ast.parse((PACKAGE / module).read_text())
+
+
+def imported(tree):
+    """Yield the dotted names that a module imports, wherever in it."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def floor_of(name):
+    return FLOORS.index(name.split(".")[1])
+
+
+@pytest.mark.parametrize("module", [name for name in MODULES if "/" in name])
+def test_imports_go_down(module):
+    own = FLOORS.index(module.split("/")[0])
+    for name in imported(tree_of(module)):
+        parts = name.split(".")
+        if parts[0] == "mdfconv" and len(parts) > 1 and parts[1] in FLOORS:
+            assert floor_of(name) >= own, f"{module} imports {name}"
+        if parts[0] in TERMINAL:
+            assert FLOORS[own] == "cli", f"{module} imports {name}"
+
+
+def test_every_room_has_a_floor():
+    rooms = {name.split("/")[0].removesuffix(".py") for name in MODULES}
+    assert rooms - {"__init__", "__main__"} == set(FLOORS)
+
+
+def docstrings(tree):
+    """Return the string nodes that are documentation."""
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    return {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, kinds) and node.body and isinstance(node.body[0], ast.Expr)
+    }
+
+
+@pytest.mark.parametrize("module", [n for n in MODULES if not n.startswith("distributions/")])
+def test_no_module_elsewhere_names_a_distribution(module):
+    entries = mdfconv.list_distributions()
+    names = {name for entry in entries for name in (entry.name, *entry.aliases)}
+    names |= {f"{entry.name}:{encoding.name}" for entry in entries for encoding in entry.encodings}
+    rooms = {type(entry).__module__ for entry in entries}
+    tree = tree_of(module)
+    documentation = docstrings(tree)
+    named = {
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and node.value in names and id(node) not in documentation
+    }
+    opened = rooms & set(imported(tree))
+    if module in ABOUT_PARTICULAR_ONES:
+        assert named or opened, f"{module} names none any more: strike it from the list"
+    else:
+        assert not named
+        assert not opened

@@ -13,7 +13,6 @@ import typer
 
 from mdfconv.cli.options import Format
 from mdfconv.distributions.parameter import number_text
-from mdfconv.output.files import file_bytes, write_files
 from mdfconv.output.records import Record, cell_text, csv_text, json_text, markdown_text
 
 if TYPE_CHECKING:
@@ -66,6 +65,9 @@ def write_table(
     """
     form = form_of(form, output)
     if output is not None:
+        # Most calls write no file, and its imports would be a tenth of their start.
+        from mdfconv.output.files import file_bytes, write_files
+
         write_files({output: file_bytes(table_text(columns, rows, form))})
     elif form is Format.table:
         print_table(rich_table(columns, rows, title, styles))

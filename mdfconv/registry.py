@@ -9,6 +9,8 @@ from mdfconv.errors import MdfconvError
 
 Item = TypeVar("Item")
 
+# Stands for every item where a command takes one, and so names none.
+ALL = "all"
 _SEPARATORS = str.maketrans("_/ ", "---")
 
 
@@ -34,9 +36,17 @@ class Registry(Generic[Item]):
         Raises
         ------
         MdfconvError
-            If the name or an alias is taken.
+            If the name or an alias is taken, or is not one as they are looked up: in small
+            letters, with ``-`` between words, without the colon that sets off an encoding or a
+            setting.
         """
+        if isinstance(aliases, str):
+            raise MdfconvError(f"the aliases of {name} are a sequence, not the string {aliases!r}")
         for word in (name, *aliases):
+            if not isinstance(word, str) or word in ("", ALL) or word != _key(word) or ":" in word:
+                raise MdfconvError(
+                    f"{word!r} cannot name a {self.kind}", "small letters, and - between words"
+                )
             if word in self._aliases:
                 raise MdfconvError(f"the {self.kind} '{word}' exists already")
         self._items[name] = item
@@ -46,7 +56,7 @@ class Registry(Generic[Item]):
         """Return the item with a name or alias; raise `MdfconvError` if there is none."""
         if not isinstance(name, str):
             raise MdfconvError(f"a {self.kind} is named by a string, not {name!r}")
-        key = name.strip().lower().translate(_SEPARATORS)
+        key = _key(name)
         if key not in self._aliases:
             raise unknown_name(self.kind, name, list(self._aliases))
         return self._items[self._aliases[key]]
@@ -58,6 +68,10 @@ class Registry(Generic[Item]):
     def names(self) -> list[str]:
         """The names, without the aliases."""
         return list(self._items)
+
+
+def _key(name: str) -> str:
+    return name.strip().lower().translate(_SEPARATORS)
 
 
 def unknown_name(kind: str, name: str, known: Sequence[str]) -> MdfconvError:

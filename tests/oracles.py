@@ -165,6 +165,10 @@ def relative_error(value, exact):
     return float(abs(mp.mpf(float(value)) - exact) / abs(exact))
 
 
+# What the paper's closed forms convert, Smoothie as the GGX that it is.
+IN_THE_PAPER = {"beckmann", "gauss", "ggx", "blinn-phong", "schlick", "sawicki", "smoothie"}
+
+
 def closed_form(source, target, x):
     """Return the paper's conversion at 50 digits, from equations (11)-(15), Tables 3 and 4."""
     x = mp.mpf(float(x))

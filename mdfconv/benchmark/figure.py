@@ -26,6 +26,8 @@ _ROUNDING = 1e-12  # smaller errors are none
 _BELOW = 0.1
 # An axis over a little more than two decades has too few powers of ten to be read between.
 _FEW_DECADES = 200
+# Leading digits of the ticks on it, and on one that may hold no power of ten or only one.
+_TICKS, _CLOSE_TICKS, _FEW_TIMES = (1, 2, 3, 5), (1, 1.2, 1.5, 2, 3, 4, 5, 6, 7, 8, 9), 8
 # The labels beside the outermost points need as much more of the range at either end.
 _MARGIN = 0.06
 
@@ -161,8 +163,10 @@ class _Panel:
         low, high = axes.get_xlim()
         margin = (high / low) ** _MARGIN
         axes.set_xlim(low / margin, high * margin)
-        if high * margin < _FEW_DECADES * low / margin:
-            axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
+        span = margin**2 * high / low
+        if span < _FEW_DECADES:
+            ticks = _CLOSE_TICKS if span < _FEW_TIMES else _TICKS
+            axes.xaxis.set_major_locator(LogLocator(subs=ticks))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.xaxis.set_minor_formatter(NullFormatter())
         top = 2 * axes.get_ylim()[1]

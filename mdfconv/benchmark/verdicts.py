@@ -45,8 +45,8 @@ def _rational(rows: Sequence[Substitute], precision: str) -> str:
     return (
         f"{start} the rational forms take {_listed(times, rational)} ns, those with an "
         f"exponential or a power {_listed(times, others)} ns. Of the rational ones "
-        f"{'; '.join(comparisons)}. On the vector units of this machine, being rational buys "
-        f"{'speed' if winners == rational else gain}."
+        f"{'; '.join(comparisons)}. Against {quickest}, the quickest of those, being "
+        f"rational buys {'speed' if winners == rational else gain} on this machine."
     )
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from mdfconv.brdf.directions import Brdf, direction, dot, reflect
 from mdfconv.distributions.evaluation import Array, gauss_legendre
+from mdfconv.errors import MdfconvError
 
 Sampler: TypeAlias = Callable[[Array, Array, Array], tuple[Array, Array]]
 
@@ -25,6 +26,8 @@ _GROWTH = 2.5
 _FIRST_PANEL = 0.02
 # Where the integrand ends like a root the panels shrink to this, whose share is below rounding.
 _LEAST_PANEL = 1e-8
+# The peak is about 1/width², and divided by small cosines.
+_LEAST_WIDTH = 1e-140
 # Nearer to grazing rounding shows, and the limit is within 1e-6 from here on.
 _LEAST_COSINE = 1e-8
 # With some 500 nodes for each azimuth the intermediates of as many stay in the cache.
@@ -68,7 +71,14 @@ def directional_albedo(model: FurnaceModel, cosine: Array) -> Array:
     -------
     numpy.ndarray, shape (n,)
         The share of the light that is reflected.
+
+    Raises
+    ------
+    MdfconvError
+        If the lobe is so narrow that no float holds its peak.
     """
+    if model.width < _LEAST_WIDTH:
+        raise MdfconvError(f"a lobe of {model.width:.2g} rad is a mirror: its peak overflows")
     integrate = _around_mirror if model.around_mirror else _around_normal
     clipped = np.clip(cosine, _LEAST_COSINE, 1)
     return np.array([integrate(model, float(value)) for value in clipped])

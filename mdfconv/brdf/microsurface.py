@@ -45,7 +45,7 @@ class Microsurface:
     Raises
     ------
     MdfconvError
-        If the parameter is illegal.
+        If the parameter is illegal, or a pair and the distribution takes none.
     """
 
     distribution: Distribution
@@ -53,6 +53,11 @@ class Microsurface:
     normalized: bool = True
 
     def __post_init__(self) -> None:
+        if isinstance(self.parameter, tuple):
+            if not self.distribution.anisotropic:
+                raise MdfconvError(f"{self.distribution.label} takes no pair of parameters")
+            if len(self.parameter) != 2:
+                raise MdfconvError(f"expected a number or a pair, got {len(self.parameter)} values")
         for value in _pair(self.parameter):
             self.distribution.parameter.check_one(value, self.distribution.label)
 

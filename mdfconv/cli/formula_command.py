@@ -8,9 +8,9 @@ import typer
 
 from mdfconv.cli.options import (
     ExposureOption,
+    FixedGammaOption,
     FormatOption,
     FromOption,
-    GammaOption,
     MetricOption,
     ToOption,
     chosen_metric,
@@ -43,7 +43,7 @@ def command(
     ] = None,
     metric: MetricOption = "unit",
     exposure: ExposureOption = None,
-    gamma: GammaOption = None,
+    gamma: FixedGammaOption = None,
     language: Annotated[
         str, typer.Option("--lang", metavar="LANG", help="glsl, hlsl, c, python or latex.")
     ] = "glsl",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli.options import ExposureOption, MetricOption, chosen_metric
-from mdfconv.cli.tables import progress, rich_table, tell
+from mdfconv.cli.tables import print_table, progress, rich_table, tell
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import json_text
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 # Longer tables are cut on the screen; JSON has every row.
 _ROWS_SHOWN = 100
-_PIPE_WIDTH = 160
 
 
 class ReportFormat(StrEnum):
@@ -188,8 +187,6 @@ def _rows(
 
 def _print_table(record: dict[str, Any], rules: list[str]) -> None:
     """Print what was converted to standard error."""
-    from rich.console import Console
-
     rows = record["materials"]
     shown = [
         {
@@ -202,15 +199,14 @@ def _print_table(record: dict[str, Any], rules: list[str]) -> None:
         }
         for row in rows[:_ROWS_SHOWN]
     ]
-    out = Console(stderr=True, width=None if Console(stderr=True).is_terminal else _PIPE_WIDTH)
     if shown:
         title = f"{record['file']}, {record['metric']} metric"
-        out.print(rich_table(list(shown[0]), shown, title, right=["Ns", "Pr", "RMSE", *rules]))
+        right = ["Ns", "Pr", "RMSE", *rules]
+        print_table(rich_table(list(shown[0]), shown, title, right=right), err=True)
     else:
-        out.print(f"{record['file']}: nothing to convert", highlight=False)
+        typer.echo(f"{record['file']}: nothing to convert", err=True)
     if len(rows) > _ROWS_SHOWN:
-        more = f"… and {len(rows) - _ROWS_SHOWN} more; --format json has them all"
-        out.print(more, highlight=False)
+        typer.echo(f"… and {len(rows) - _ROWS_SHOWN} more; --format json has them all", err=True)
     for texture in record["textures"]:
         typer.echo(f"{texture['keyword']} {texture['file']} (line {texture['line']})", err=True)
 

@@ -102,13 +102,17 @@ ExposureOption = Annotated[
         help="Exposure of the display metric; 1, if not given, puts the source's peak at white.",
     ),
 ]
+_GAMMA_HELP = "Second parameter, of gtr and student-t; 2, which is ggx, if not given"
 GammaOption = Annotated[
     str | None,
     typer.Option(
         "--gamma",
         metavar="G",
-        help="Second parameter, of gtr and student-t; 2, which is ggx, if not given; free fits it.",
+        help=f"{_GAMMA_HELP}; free fits it.",
     ),
+]
+FixedGammaOption = Annotated[
+    str | None, typer.Option("--gamma", metavar="G", help=f"{_GAMMA_HELP}.")
 ]
 FormatOption = Annotated[
     Format | None,
@@ -132,7 +136,7 @@ PngOption = Annotated[
 DpiOption = Annotated[
     int,
     typer.Option(
-        "--dpi", metavar="N", min=1, max=_LARGEST_DPI, help="Resolution of pictures, dots an inch."
+        "--dpi", metavar="N", min=10, max=_LARGEST_DPI, help="Resolution of pictures, dots an inch."
     ),
 ]
 
@@ -151,6 +155,8 @@ def chosen_metric(name: str, exposure: float | None = None) -> Metric:
         return metric_named(name)
     if metric_named(name).setting != "exposure":
         raise MdfconvError(f"the {name} metric has no exposure: give no --exposure")
+    if ":" in name:
+        raise MdfconvError(f"the exposure is given twice, by --metric {name} and by --exposure")
     return metric_named(f"{name}:{exposure!r}")
 
 
@@ -169,7 +175,7 @@ def fixed_gamma(text: str | None) -> float | None:
     gamma = chosen_gamma(text)
     if gamma is None or isinstance(gamma, float):
         return gamma
-    raise MdfconvError("--gamma is a number here: only convert fits it")
+    raise MdfconvError("--gamma is a number here", "convert and fit find it")
 
 
 def chosen_gamma(text: str | None) -> Gamma:

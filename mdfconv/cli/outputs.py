@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mdfconv.cli.tables import tell
 from mdfconv.errors import MdfconvError
-from mdfconv.output.files import write_files
+from mdfconv.output.files import is_stream, write_files
 
 _DEFAULT_FOLDER = Path("reports")
 
@@ -29,9 +29,10 @@ def check_outputs(*outputs: Path | None, inputs: Sequence[Path] = ()) -> list[Pa
             raise MdfconvError(f"{path} is the input", "write to another file")
         if path.is_dir():
             raise MdfconvError(f"cannot write {path}: Is a directory")
-        if not path.parent.is_dir():
+        folder = path.resolve().parent
+        if not is_stream(path) and not folder.is_dir():
             raise MdfconvError(f"cannot write {path}: {path.parent} is not an existing directory")
-        if not os.access(path.parent, os.W_OK):
+        if not os.access(path if is_stream(path) else folder, os.W_OK):
             raise MdfconvError(f"cannot write {path}: Permission denied")
     return named
 

@@ -8,10 +8,10 @@ import typer
 
 from mdfconv.cli.options import (
     ExposureOption,
+    FixedGammaOption,
     Format,
     FormatOption,
     FromOption,
-    GammaOption,
     MetricOption,
     chosen_metric,
     fixed_gamma,
@@ -48,7 +48,7 @@ def command(
     ] = 0.05,
     metric: MetricOption = "unit",
     exposure: ExposureOption = None,
-    gamma: GammaOption = None,
+    gamma: FixedGammaOption = None,
     format_: FormatOption = None,
 ) -> None:
     """Recommend the cheapest distribution and conversion for a surface.

@@ -102,36 +102,42 @@ def rich_table(
 ) -> Any:
     """Return a table for a terminal; numbers, and the columns named, stand to the right."""
     from rich import box
+    from rich.cells import cell_len
     from rich.markup import escape
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, title=title, title_style="bold", title_justify="left")
-    for column in columns:
+    cells = [[cell_text(_flat(row[column])) for column in columns] for row in rows]
+    for number, column in enumerate(columns):
         text = column not in right and any(isinstance(row[column], str) for row in rows)
         justify: Literal["left", "right"] = "left" if text else "right"
-        table.add_column(column, justify=justify, overflow="fold", no_wrap=not text)
-    for number, row in enumerate(rows):
-        cells = [escape(cell_text(_flat(row[column]))) for column in columns]
-        table.add_row(*cells, style=styles[number] if styles else None)
+        # Rich takes a column that does not wrap for as narrow as its longest word.
+        widest = None if text else max(cell_len(row[number]) for row in [columns, *cells])
+        table.add_column(
+            column, justify=justify, overflow="fold", no_wrap=not text, min_width=widest
+        )
+    for number, row_cells in enumerate(cells):
+        table.add_row(*map(escape, row_cells), style=styles[number] if styles else None)
     return table
 
 
-def print_table(table: Any) -> None:
+def print_table(table: Any, *, err: bool = False) -> None:
     """Print a Rich table, wider than the terminal rather than with numbers broken."""
     from rich.console import Console
 
-    out = console()
+    out = console(err=err)
     needed = out.measure(table, options=out.options.update(max_width=_WIDEST)).minimum
     if needed > out.width:
-        out = Console(width=needed, highlight=False)
+        out = Console(stderr=err, width=needed, highlight=False)
     out.print(table)
 
 
-def console() -> Console:
-    """Return a Rich console on standard output, wide enough for a table in a pipe."""
+def console(*, err: bool = False) -> Console:
+    """Return a Rich console on standard output or error, wide enough for a table in a pipe."""
     from rich.console import Console
 
-    return Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False)
+    stream = sys.stderr if err else sys.stdout
+    return Console(stderr=err, width=None if stream.isatty() else _PIPE_WIDTH, highlight=False)
 
 
 @contextmanager
@@ -158,6 +164,8 @@ def _flat(cell: Any) -> Any:
     if isinstance(cell, Mapping):
         return "; ".join(f"{key}: {_flat(value)}" for key, value in cell.items())
     if isinstance(cell, list | tuple):
+        if any(isinstance(value, Mapping) for value in cell):
+            return " | ".join(str(_flat(value)) for value in cell)
         separator = "; " if any(isinstance(value, str) for value in cell) else ","
         return separator.join(str(value) for value in cell)
     return cell

@@ -10,7 +10,7 @@ import typer
 
 from mdfconv.cli.options import (
     ExposureOption,
-    GammaOption,
+    FixedGammaOption,
     MethodOption,
     MetricOption,
     PngOption,
@@ -58,7 +58,7 @@ def command(
     method: MethodOption = "fast",
     metric: MetricOption = "unit",
     exposure: ExposureOption = None,
-    gamma: GammaOption = None,
+    gamma: FixedGammaOption = None,
     exponent_max: Annotated[
         float, typer.Option(metavar="N", help="Exponent of the brightest texel, for exponent.")
     ] = 1000.0,
@@ -90,7 +90,7 @@ def command(
 
     mdfconv texture rough.tif -o gloss.tif --from ggx:roughness --to beckmann:glossiness
 
-    mdfconv texture orm.png -o new.png --channel g --from ggx:roughness --to ggx:alpha --depth 16
+    mdfconv texture orm.png -o new.png --channel g --from ggx:roughness --to ggx:alpha --depth 8
     """
     from mdfconv.scene.texture import convert_texture_file
     from mdfconv.scene.texture_rule import TextureRule

@@ -76,12 +76,12 @@ def convert(
     >>> convert([100, 1000], "blinn-phong", "ggx", method="half-angle").round(4)
     array([0.1794, 0.0577])
     """
-    ends = endpoints(source, target, None if gamma == FREE else gamma)
+    ends = endpoints(source, target, fixed_gamma(gamma))
     rule = chosen_method(method, *ends, gamma)
     kept = metric_named(metric)
     if not isinstance(values, tuple):
         operand = as_operand(values)
-        if gamma == FREE:
+        if isinstance(gamma, str):
             results = apply_free(kept, ends[0].decode(operand), *ends)
             return tuple(_like(array, operand) for array in results[:2])
         return _convert(operand, rule, kept, *ends)
@@ -94,6 +94,15 @@ def convert(
     return _convert(x, rule, kept, *ends), _convert(y, rule, kept, *ends)
 
 
+def fixed_gamma(gamma: Gamma) -> float | None:
+    """Return γ, None if it is free; raise `MdfconvError` for any other word."""
+    if not isinstance(gamma, str):
+        return gamma
+    if gamma != FREE:
+        raise MdfconvError(f"gamma is a number or '{FREE}', not '{gamma}'")
+    return None
+
+
 def chosen_method(name: str | None, source: Endpoint, target: Endpoint, gamma: Gamma) -> Method:
     """Return the method that was asked for, or the one that a pair gets without a choice.
 
@@ -102,7 +111,7 @@ def chosen_method(name: str | None, source: Endpoint, target: Endpoint, gamma: G
     MdfconvError
         If the name is not known, or γ is free and cannot be for the target or the method.
     """
-    if gamma != FREE:
+    if not isinstance(gamma, str):
         pair = source.distribution, target.distribution
         return default_method(*pair) if name is None else method_named(name)
     if target.distribution.second_parameter is None:

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from mdfconv.conversion.arrays import FREE, Gamma, apply, apply_free, chosen_method
+from mdfconv.conversion.arrays import Gamma, apply, apply_free, chosen_method, fixed_gamma
 from mdfconv.conversion.endpoint import Endpoint, endpoints
 from mdfconv.conversion.equivalence import exact_route
 from mdfconv.conversion.method import Method
@@ -103,11 +103,11 @@ def explain(
     MdfconvError
         As `convert`.
     """
-    ends = endpoints(source, target, None if gamma == FREE else gamma)
+    ends = endpoints(source, target, fixed_gamma(gamma))
     rule, kept = chosen_method(method, *ends, gamma), metric_named(metric)
     axes = _axes(values, *ends)
     parameter = ends[0].decode([value for pair in axes for value in pair])
-    table = _Table(rule, kept, parameter, *ends, free=gamma == FREE, errors=errors)
+    table = _Table(rule, kept, parameter, *ends, free=isinstance(gamma, str), errors=errors)
     return [table.conversion(pair, rows) for pair, rows in _with_rows(axes)]
 
 

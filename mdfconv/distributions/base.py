@@ -15,6 +15,8 @@ from mdfconv.distributions.parameter import Encoding, Parameter, number_text
 from mdfconv.errors import MdfconvError
 
 _SMALLEST_ANGLE = 1e-30
+# The square of an angle is about the share of the lobe within it: the least one above 0.
+_SMALLEST_DRAWN = 1e-160
 
 
 class Distribution(ABC):
@@ -374,8 +376,10 @@ class Distribution(ABC):
             below, above = self._cumulative(np.exp(log_beta), parameter)
             return np.where(lobe < tail, below - lobe, tail - above)
 
-        bracket = (np.log(_SMALLEST_ANGLE), np.log(np.pi / 2))
-        return np.exp(find_root(excess, bracket, lobe, tail, parameter))
+        bracket = (np.log(_SMALLEST_DRAWN), np.log(np.pi / 2))
+        beta = np.exp(find_root(excess, bracket, lobe, tail, parameter))
+        # A tail too thin for any float below π/2 lies there.
+        return np.where(np.isnan(beta) & (tail < lobe), 0.5 * np.pi, beta)
 
     def _half_tangent(self, parameter: Array) -> Array:
         def excess(log_beta: Array, parameter: Array) -> Array:

@@ -122,9 +122,11 @@ class GTR(Distribution):
         if y == 0:
             z, rest = lobe * whole, tail * whole
         else:
-            # From the horizon inwards: (1+x)^(−y) = (1+X)^(−y) + (1 − F) (1 − (1+X)^(−y)).
-            near = np.log1p(-lobe * span)
-            z = -np.where(lobe < tail, near, np.log(np.exp(-y * whole) + tail * span)) / y
+            # From the horizon inwards: (1+x)^(−y) = (1+X)^(−y) + (1 − F) (1 − (1+X)^(−y)), whose
+            # logarithm has no digits where all of it is nearly 1.
+            near = (lobe < tail) | (y * whole < 1)
+            inwards = np.log(np.where(near, 1, np.exp(-y * whole) + tail * span))
+            z = -np.where(near, np.log1p(-np.where(near, lobe, 0) * span), inwards) / y
             rest = np.log1p(tail * np.expm1(y * whole)) / y
         uniform = largest == 0
         scale = np.where(uniform, 1, largest)

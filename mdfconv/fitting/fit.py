@@ -22,6 +22,8 @@ from mdfconv.fitting.scan import lowest_minima, scan
 
 # The intermediates of a scan, 76 candidates × 250 angles a row, stay in the cache.
 _ROWS_AT_ONCE = 32
+# Of the ends of a plateau, between which all lobes are clipped as a whole, the last.
+_AS_LOW = 1 + 1e-9
 # The coarse distance at an end of the scan is right to a per cent or so.
 _CLEARLY_LOWER = 0.98
 
@@ -90,7 +92,7 @@ def _minimum(problem: Problem) -> tuple[Array, Array]:
         candidates, coarse = scan(problem)
         for column in lowest_minima(coarse).T:
             local, value = refine(problem, candidates, column)
-            lower = value < distance
+            lower = value <= _AS_LOW * distance
             best[lower], distance[lower] = local[lower], value[lower]
         ends = coarse[:, 0]
         if not problem.target.parameter.upper_closed:

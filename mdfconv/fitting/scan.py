@@ -54,10 +54,12 @@ def scan(problem: Problem) -> tuple[Array, Array]:
 def lowest_minima(distance: Array) -> Indices:
     """Return the columns of the lowest minima of each row, shape (n, 3); −1 for none.
 
-    The scan is approximate, so a minimum that is nearly as low as the lowest counts as well.
+    The scan is approximate, so a minimum that is nearly as low as the lowest counts as well. Of
+    a plateau, which clipping at white makes, both ends count: the minimum may lie beside either.
     """
     padded = np.pad(distance, ((0, 0), (1, 1)), constant_values=np.inf)
-    local = (distance <= padded[:, :-2]) & (distance < padded[:, 2:])
+    left, right = padded[:, :-2], padded[:, 2:]
+    local = (distance <= left) & (distance <= right) & ((distance < left) | (distance < right))
     ranked = np.where(local, distance, np.inf)
     columns = np.argsort(ranked, axis=1, kind="stable")[:, :_MOST_MINIMA]
     values = np.take_along_axis(ranked, columns, axis=1)

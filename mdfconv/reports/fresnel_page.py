@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Any
 
@@ -64,7 +65,7 @@ def fresnel_page() -> Artefact:
     return Artefact(
         files,
         "Smoothie, the fit of the Fresnel term",
-        f"{constants}: within {100 * off:.1f} % of the printed ones",
+        f"{constants}: within {math.ceil(1000 * off) / 10:g} % of the printed ones",
         "mdfconv fresnel",
     )
 

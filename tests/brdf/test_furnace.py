@@ -204,6 +204,8 @@ def test_command(tmp_path):
         (["--brdf", "ggx", "0.5", "--mc", "10", "--seed", "-1"], "--seed is at least 0"),
         (["--brdf", "ggx", "0.5", "--png", "x", "--output", "x"], "x is named for two results"),
         (["--brdf", "modified-phong", "--normalizer", "arvo", "1e7"], "use mallett-yuksel"),
+        (["--brdf", "ggx", "1e-300"], "is a mirror"),
+        (["--brdf", "ggx", "1e-160", "--g", "correlated"], "is a mirror"),
         (["--brdf", "ggx", "0.5", "--speed"], "--speed compares the normalizers"),
         (["--brdf", "ggx", "0.5", "--png", "none/x.png"], "cannot write none/x.png"),
     ],

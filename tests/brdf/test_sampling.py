@@ -133,6 +133,10 @@ def test_what_cannot_be_drawn_is_refused():
             surface(name, 0.3).visible_normals(direction(np.array([0.2])), u, u)
     with pytest.raises(MdfconvError, match="no sampler for a pair"):
         surface("ashikhmin-shirley", (5.0, 9.0)).half_vectors(u, u)
+    with pytest.raises(MdfconvError, match="smoothie takes no pair"):
+        surface("smoothie", (0.1, 0.3))
+    with pytest.raises(MdfconvError, match="got 1 values"):
+        surface("ggx", (0.1,))
 
 
 def test_frames_are_orthonormal_and_right_handed():

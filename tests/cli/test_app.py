@@ -47,6 +47,10 @@ def test_list():
     status, out, _ = run("list", "--format", "table")
     assert status == 0
     assert "trowbridge-reitz" in out
+    status, out, _ = run("list", "--format", "csv")
+    assert status == 0
+    assert "name: alpha; symbol: m_B; legal: m_B > 0; typical: 0.01,0.8" in out
+    assert "{" not in out
 
 
 def test_completion():

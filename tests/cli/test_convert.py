@@ -175,6 +175,10 @@ def test_table_in_a_pipe_has_no_escapes():
             ("--from", "beckmann", "--to", "ggx", "--metric", "unit", "--exposure", "2", "0.2"),
             "the unit metric has no exposure",
         ),
+        (
+            ("--from", "beckmann", "--to", "ggx", "--metric", "display:4", "--exposure", "2", "1"),
+            "the exposure is given twice",
+        ),
         (("--from", "beckmann", "--to", "ggx", "-"), "holds no values"),
         (("--from", "beckmann", "--to", "ggx", "-", "-"), "only once"),
         (("--form", "beckmann", "--to", "ggx", "1"), "no such option: --form"),

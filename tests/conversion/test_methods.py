@@ -72,6 +72,22 @@ def test_the_papers_figures():
     assert mdfconv.convert(1000, "blinn-phong", "sawicki") == pytest.approx(1174.3)
 
 
+@pytest.mark.parametrize(
+    ("gamma", "message"),
+    [
+        (np.array([2.0, 3.0]), "one number, not an array"),
+        (np.array([]), "one number, not an array"),
+        ("FREE", "a number or 'free', not 'FREE'"),
+        ("frei", "a number or 'free', not 'frei'"),
+    ],
+)
+def test_gamma_is_a_number_or_free(gamma, message):
+    with pytest.raises(mdfconv.MdfconvError, match=message):
+        mdfconv.convert(0.2, "beckmann", "gtr", gamma=gamma)
+    with pytest.raises(mdfconv.MdfconvError, match=message):
+        mdfconv.explain(0.2, "beckmann", "gtr", gamma=gamma)
+
+
 def test_gtr_with_gamma_two_is_ggx_and_others_have_no_closed_form():
     assert mdfconv.convert(0.2, "beckmann", "gtr") == mdfconv.convert(0.2, "beckmann", "ggx")
     with pytest.raises(ValueError, match=r"gtr \(γ = 3\); use half-angle or peak"):

@@ -69,6 +69,29 @@ def test_samples_come_back(label):
         )  # fmt: skip
 
 
+@pytest.mark.parametrize("step", [1e-15, 1e-14, 1e-12, -1e-12, 1e-10, 1e-8, 1e-6])
+@pytest.mark.parametrize("alpha", [1e-8, 0.3, 0.99])
+def test_samples_come_back_near_gamma_one(alpha, step):
+    gtr = mdfconv.distribution("gtr").with_gamma(1 + step)
+    shares = np.array([1e-9, 0.1, 0.5, 0.9, 1 - 1e-9])
+    back = gtr.cumulative(gtr.sample(shares, alpha), alpha)
+    np.testing.assert_allclose(back, shares, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_the_smallest_shares_are_drawn(name):
+    entry = ENTRIES[name]
+    parameter = 10.0 if entry.parameter.larger_is_smoother else 0.5
+    shares = np.array([1e-60, 1e-100, 1e-200])
+    # At the normal F is π D(0) β².
+    exact = np.sqrt(shares / (np.pi * entry.normalized(0.0, parameter)))
+    np.testing.assert_allclose(entry.sample(shares, parameter), exact, rtol=1e-12)
+    tail = entry.sample(shares, parameter, complement=True)
+    edge = entry.edge(np.array([parameter]))
+    end = HALF_PI if edge is None else edge[0]
+    assert np.all((tail > 0.8 * end) & (tail <= end * (1 + 1e-12)))
+
+
 @pytest.mark.parametrize("name", ENTRIES)
 def test_samples_are_distributed_as_the_density_says(name):
     entry = ENTRIES[name]

@@ -21,7 +21,7 @@ from mdfconv.scene.shininess import (
     importer_results,
     roughness_of,
 )
-from tests.cli.runner import run
+from tests.cli.runner import run, run_on_terminal
 
 DATA = Path(__file__).parent / "data"
 LIBRARIES = [DATA / "lecture_brdfs.mtl", DATA / "lecture_metals.mtl"]
@@ -289,6 +289,15 @@ def test_errors_are_those_of_the_conversion():
         assert entry.rmse == pytest.approx(wanted.rmse, rel=1e-4)
     assert not any(math.isnan(entry.rmse) for entry in found)
     assert np.all(np.diff([entry.roughness for entry in found]) < 0)
+
+
+def test_the_table_is_whole_on_a_narrow_terminal(tmp_path):
+    (tmp_path / "in.mtl").write_text("newmtl chrome\nNs 500.5\n")
+    words = "mtl", tmp_path / "in.mtl", "-o", tmp_path / "out.mtl", "--compare"
+    status, out = run_on_terminal(*words, COLUMNS="60")
+    assert status == 0
+    for cell in ("chrome", "500.5", "0.241561", "1 - Ns/1000", "0.293 (0.18)"):
+        assert cell in out
 
 
 def test_any_metric_is_answered():

@@ -231,11 +231,11 @@ def _reason(
     ]
     tie = f" ({' and '.join(rivals)} as quick, but for noise)" if rivals else ""
     if count == 1:
-        return f"keep {source}: nothing else stays within {tolerance:g} of its peak."
+        return f"keep {source}: nothing else stays within {tolerance:g} of it."
     if chosen.method == NOT_CONVERTED:
         return f"keep {source}: of {count} within {tolerance:g} it is the cheapest{tie}."
     return (
-        f"{chosen.distribution} stays within {tolerance:g} of the peak of {source} "
+        f"{chosen.distribution} stays within {tolerance:g} of {source} "
         f"(maximum error {chosen.max_error:.2g}) at {chosen.ns / own.ns:.2g} of its time, the "
         f"cheapest of {count} that do{tie}; {chosen.method} is the cheapest conversion that keeps "
         "it there."

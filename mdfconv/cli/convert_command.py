@@ -42,8 +42,8 @@ from mdfconv.fitting.metrics import Metric, list_metrics
 _VALUES_WITH_ALTERNATIVES = 10
 _EVERY = "all"
 _FOOTNOTE = (
-    "[dim]Errors: root mean square and maximum, relative to the source's peak, on β from 0 "
-    "to 4.8 β_half; of the unit forms, or in the metric of a fit.[/dim]"
+    "[dim]Errors: root mean square and maximum, relative to the source's peak (environment: "
+    "to all facets), on β from 0 to 4.8 β_half; of the unit forms, or in the metric of a fit.[/dim]"
 )
 
 

@@ -91,7 +91,8 @@ MetricOption = Annotated[
         metavar="METRIC",
         autocompletion=_metrics,
         help="What a fit keeps, and what errors are taken of: unit (the shape of the lobe), energy "
-        "(the light) or display (the picture on a screen).",
+        "(the light of the sun or a lamp), environment (the light of a natural environment) or "
+        "display (the picture on a screen).",
     ),
 ]
 ExposureOption = Annotated[

@@ -31,8 +31,9 @@ if TYPE_CHECKING:
     from mdfconv.benchmark.recommendation import Recommendation
 
 _FOOTNOTE = (
-    "[dim]Errors: root mean square and maximum under the metric, relative to the source's peak, "
-    "on β from 0 to 4.8 β_half. ns: one evaluation in float32, now.[/dim]"
+    "[dim]Errors: root mean square and maximum under the metric, relative to the source's peak "
+    "(environment: to all facets), on β from 0 to 4.8 β_half. ns: one evaluation in float32, "
+    "now.[/dim]"
 )
 
 

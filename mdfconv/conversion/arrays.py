@@ -45,8 +45,9 @@ def convert(
         given the closed form, or the fit of a pair that has none.
     metric : str or Metric
         What ``"fit"`` and ``"fast"`` keep: ``"unit"`` (the shape of the lobe), ``"energy"``
-        (the light) or ``"display"`` (the picture on a screen; ``"display:4"`` at exposure 4, 1
-        puts the source's peak at white).
+        (the light of the sun or a lamp), ``"environment"`` (the light of a natural environment)
+        or ``"display"`` (the picture on a screen; ``"display:4"`` at exposure 4, 1 puts the
+        source's peak at white).
     gamma : float or "free", optional
         The second parameter, on either side that has one; its default if not given. ``"free"``
         fits that of the target along with the first.

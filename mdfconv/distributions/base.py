@@ -17,6 +17,8 @@ from mdfconv.errors import MdfconvError
 _SMALLEST_ANGLE = 1e-30
 # The square of an angle is about the share of the lobe within it: the least one above 0.
 _SMALLEST_DRAWN = 1e-160
+# Of a central difference in ln p: truncation falls with its square, rounding rises as it falls.
+_STEP = float(np.finfo(float).eps) ** (1 / 3)
 
 
 class Distribution(ABC):
@@ -280,6 +282,26 @@ class Distribution(ABC):
     @abstractmethod
     def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         """Kernel of F(β) and 1 − F(β), each with its own digits."""
+
+    def cumulative_with_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        """Return F(β) and ∂F/∂ ln p, for fits.
+
+        Parameters
+        ----------
+        beta : numpy.ndarray, shape (n, k)
+            Angles in [0, π/2], radians.
+        parameter : numpy.ndarray, shape (n, 1)
+            Legal parameters p.
+        """
+        share = self._cumulative(beta, parameter)[0]
+        if self.scales_with_slope:
+            # F is a function of tan β / p, and dF = 2π D sin β cos β dβ.
+            lobe = self._lobe(beta, parameter) * self._at_normal(parameter)
+            return share, -0.5 * np.pi * lobe * np.square(np.sin(2 * beta))
+        above, below = (
+            self._cumulative(beta, parameter * np.exp(step))[0] for step in (_STEP, -_STEP)
+        )
+        return share, (above - below) / (2 * _STEP)
 
     def _off_axis_maximum(self, parameter: Array) -> Array | None:
         """Kernel of max D / D(0); None where that is 1 for every parameter given."""

@@ -65,6 +65,12 @@ class BlinnPhong(Distribution):
         exponent = -0.5 * (parameter + 2) * np.log1p(tangent_square(beta))
         return -np.expm1(exponent), np.exp(exponent)
 
+    def cumulative_with_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        """Return F and ∂F/∂ ln N, as in the base class."""
+        logarithm = 0.5 * np.log1p(tangent_square(beta))
+        exponent = -(parameter + 2) * logarithm
+        return -np.expm1(exponent), parameter * logarithm * np.exp(exponent)
+
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         exponent = 2 * negative_log_tail(lobe, tail) / (parameter + 2)
         return np.arctan(np.sqrt(np.expm1(exponent)))

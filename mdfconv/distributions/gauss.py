@@ -14,6 +14,8 @@ from mdfconv.distributions.parameter import Parameter
 _NODES = 80
 # π/2 is this beyond its double.
 _HALF_PI_REST = 6.123233995736766e-17
+# From this m on a lobe is nearly uniform, and a few nodes integrate it exactly.
+_WIDE, _WIDE_NODES = 4.0, 16
 # Nodes for e^(−v) times a smooth function up to v = 50, from where on it is nothing.
 _LONGEST, _CUMULATIVE_NODES = 50.0, 64
 
@@ -91,6 +93,42 @@ class Gauss(Distribution):
         above = _slab_integral(angle, to_horizon, to_horizon, m)
         whole = below + above
         return below / whole, above / whole
+
+    def cumulative_with_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        """Return F and ∂F/∂ ln m, as in the base class, to 1e-15 of the whole.
+
+        The completed square is quick, and a fit asks for no digits of the tail.
+        """
+        from scipy.special import wofz
+
+        def primitive(angle: Array) -> tuple[Array, Array]:
+            # Im[w(m) − e^(−b²/m²) e^(2ib) w(m + ib/m)] over Im[…] at π/2, and its slope with
+            # w′ = −2zw + 2i/√π.
+            z = parameter + 1j * angle / parameter
+            w = wofz(z)
+            factor = np.exp(-np.square(angle / parameter) + 2j * angle)
+            turned = z.conjugate() * (2j / np.sqrt(np.pi) - 2 * z * w)
+            slope = 2 * np.square(angle / parameter) * w + turned
+            return (factor * w).imag, (factor * slope).imag
+
+        horizon = np.full_like(parameter, 0.5 * np.pi)
+        start, middle, end = (primitive(b) for b in (0 * horizon, beta, horizon))
+        whole, whole_slope = start[0] - end[0], start[1] - end[1]
+        share = (start[0] - middle[0]) / whole
+        slope = (start[1] - middle[1] - share * whole_slope) / whole
+        wide = parameter[..., 0] > _WIDE
+        if wide.any():
+            slope[wide] = self._wide_slope(beta[wide], parameter[wide])
+        return share, slope
+
+    def _wide_slope(self, beta: Array, parameter: Array) -> Array:
+        """Return ∂F/∂ ln m of nearly uniform lobes, where the differences above cancel."""
+        x, weight = gauss_legendre(_WIDE_NODES)
+        b = 0.5 * beta[..., None] * (1 + x)
+        excess = np.square(b) - _mean_square(parameter)[..., None]
+        mass = np.exp(-np.square(b / parameter[..., None])) * np.sin(2 * b) * excess
+        integral = 0.5 * beta * (mass @ weight)
+        return 2 * np.pi * self._at_normal(parameter) * integral / np.square(parameter)
 
     def _half_tangent(self, parameter: Array) -> Array:
         beta_half = parameter * np.sqrt(np.log(2))

@@ -87,6 +87,12 @@ class Sawicki(Distribution):
         q = (1 + k) * drop / (1 + k * drop)
         return q * (3 * ratio + q * q), ratio**3
 
+    def cumulative_with_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        """Return F and ∂F/∂ ln N_DS, as in the base class."""
+        share, tail = self._cumulative(beta, parameter)
+        drop = 2 * np.square(np.sin(0.5 * beta))
+        return share, 0.75 * parameter * tail * drop / (1 + 0.25 * (parameter - 1) * drop)
+
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         # 1 − q for q³ of the tail, from the side that has the digits.
         q = -np.expm1(-negative_log_tail(lobe, tail) / 3)

@@ -121,6 +121,13 @@ class Schlick(Distribution):
         below = m + (1 - m) * q
         return q / below, m * np.square(y) / below
 
+    def cumulative_with_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+        """Return F and ∂F/∂ ln m, as in the base class."""
+        w = np.minimum(2 * np.square(np.sin(0.5 * beta)) / parameter, 1)
+        y, q = 1 - w, w * (2 - w)
+        below = parameter + (1 - parameter) * q
+        return q / below, -parameter * y * (2 * w + q * y) / np.square(below)
+
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         # 1 − q = y² = (1 − F)/(1 − (1−m) F), and w = q/(1 + y).
         below = 1 - (1 - parameter) * lobe

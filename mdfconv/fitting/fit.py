@@ -73,10 +73,15 @@ def fit(
         The global minimum of each problem.
     """
     best, distance = np.full(parameter.size, np.nan), np.full(parameter.size, np.inf)
+    limits = target.parameter
+    ratio = metric.ratio(source, target) if quadrature is None else None
     for rows in _batches(parameter.size):
         problem = Problem(source, parameter, target, metric, quadrature, rows)
-        best[rows], distance[rows] = _minimum(problem)
-    limits = target.parameter
+        if ratio is None:
+            best[rows], distance[rows] = _minimum(problem)
+        else:
+            best[rows] = np.minimum(parameter[rows] * ratio, limits.upper)
+            distance[rows], _ = problem.distance(np.log(best[rows]), np.arange(rows.size))
     return Fit(best, distance, (best == limits.upper) & limits.upper_closed)
 
 

@@ -38,8 +38,8 @@ class TextureRule:
         As for `mdfconv.convert`. The default is ``"fast"``: textures use the whole range, on
         which the closed forms turn around or turn negative, and it is the fit in milliseconds.
     metric : str
-        What the fit keeps: ``"unit"``, ``"energy"`` or ``"display"``, with an exposure
-        ``"display:4"``.
+        What the fit keeps: ``"unit"``, ``"energy"``, ``"environment"`` or ``"display"``, with an
+        exposure ``"display:4"``.
     exponent_max : float
         N of a texel at 1 under ``exponent``; above 0. 1000 is the end of MTL's range.
     log2_scale : float

@@ -91,7 +91,7 @@ def test_metric_and_encoding():
 def test_plain_in_a_pipe():
     status, out, err = run("recommend", "--from", "phong", 100, "--tolerance", 1e-6)
     assert (status, out) == (0, "blinn-phong 100 none\n")
-    assert err == "mdfconv: keep blinn-phong: nothing else stays within 1e-06 of its peak.\n"
+    assert err == "mdfconv: keep blinn-phong: nothing else stays within 1e-06 of it.\n"
 
 
 def test_csv_and_markdown():
@@ -104,7 +104,7 @@ def test_csv_and_markdown():
     status, out, err = run(*arguments, "markdown")
     assert (status, err) == (0, "")
     assert out.splitlines()[2].startswith("| beckmann | 0.2 | none |")
-    assert out.endswith("Keep beckmann: nothing else stays within 1e-06 of its peak.\n")
+    assert out.endswith("Keep beckmann: nothing else stays within 1e-06 of it.\n")
 
 
 def test_table_on_a_terminal():

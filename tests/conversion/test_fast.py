@@ -19,7 +19,7 @@ from tests import generate_fast
 from tests.cli.runner import run
 
 NAMES = ("beckmann", "gauss", "ggx", "blinn-phong", "sawicki", "schlick", "smoothie")
-LIMIT = {"unit": 1e-6, "energy": 1e-6, "display": 1e-4}
+LIMIT = {"unit": 1e-6, "energy": 1e-6, "display": 1e-4, "environment": 1e-6}
 # Both ends of the usual range, Beckmann's turn at 1/√2, and seeded points between.
 RANDOM = np.random.default_rng(5)
 ALPHA = np.concatenate([[1e-8, 1e-3, 0.70710678, 0.7072, 0.999], 10 ** RANDOM.uniform(-3, 0, 5)])

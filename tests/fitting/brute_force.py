@@ -7,6 +7,7 @@ derivative. Normalizing constants come from the same trapezoid rule, not from cl
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq, minimize_scalar
 
 FORMS = {
@@ -67,7 +68,16 @@ class Grid(Angles):
             weight.append((piece + width) * 3 * top * (1 - z) ** 2 * slope)
         super().__init__(np.concatenate(beta))
         self.weight = np.concatenate(weight)
-        self.energy = self.weight * np.pi * np.sin(2 * self.beta)
+        sine = np.sin(2 * self.beta)
+        self.energy = self.weight * np.pi * sine
+        self.environment = self.weight * 4 / np.maximum(sine, 1e-300)
+        self.points = np.arange(sine.size)
+
+    def share(self, form):
+        """Return the part of a form's energy below each angle."""
+        # The steps vanish where two pieces meet: the spline runs on through the corners.
+        below = CubicSpline(self.points, self.energy * form, axis=-1).antiderivative()(self.points)
+        return below / below[..., -1:]
 
 
 class Lobe:
@@ -136,11 +146,13 @@ class Problem:
     def signal(self, form, highest, grid):
         if self.metric == "unit":
             return form / highest
+        if self.metric == "environment":
+            return grid.share(form)
         light = form / (self.white * np.sum(grid.energy * form, axis=-1, keepdims=True))
         return srgb(light) if self.metric == "display" else light
 
     def weight(self, grid):
-        return grid.weight if self.metric == "unit" else grid.energy
+        return {"unit": grid.weight, "environment": grid.environment}.get(self.metric, grid.energy)
 
     def grid(self, lobes):
         """Return a fine grid with a piece between any two corners of the lobes' signals."""

@@ -14,7 +14,7 @@ from mdfconv.registry import Registry
 __all__ = ["Metric", "list_metrics", "metric_named", "register_metric"]
 
 # The default first.
-_MODULES = ("unit", "energy", "display")
+_MODULES = ("unit", "energy", "display", "environment")
 
 _REGISTRY: Registry[type[Metric]] = Registry("metric")
 

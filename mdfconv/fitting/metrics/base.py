@@ -56,6 +56,10 @@ class Metric(ABC):
     def weight(self, beta: Array) -> Array:
         """Return w at an angle, radians."""
 
+    def ratio(self, source: Distribution, target: Distribution) -> float | None:
+        """Return p_target/p_source of the fit where that is one constant, else None."""
+        return None
+
     def encode(self, value: Array) -> Array:
         """Return S for D/P."""
         return value

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from mdfconv.brdf.directions import Brdf, direction, dot, reflect
-from mdfconv.distributions.evaluation import Array, gauss_legendre
+from mdfconv.distributions.evaluation import Array, gauss_legendre, gauss_panels
 from mdfconv.errors import MdfconvError
 
 Sampler: TypeAlias = Callable[[Array, Array, Array], tuple[Array, Array]]
@@ -153,7 +153,7 @@ def _azimuths(cosine: float) -> tuple[Array, Array]:
     """Return φ on [0, π] and weights; at grazing the horizon turns within cos θ around π/2."""
     steps = _growing(min(cosine, 1.0) * 0.2, np.pi / 2)
     edges = np.concatenate([np.pi / 2 - steps[::-1], np.pi / 2 + steps[1:]])
-    return _gauss(edges)
+    return gauss_panels(edges, _ORDER)
 
 
 def _kinks(along: Array, cosine: float) -> Array:
@@ -177,22 +177,13 @@ def _from_zero(end: Array, kinks: Array, width: float) -> tuple[Array, Array]:
     edges = _growing(min(_FIRST_PANEL * width, largest), largest)
     every = np.concatenate([np.broadcast_to(edges, (end.size, edges.size)), kinks], axis=1)
     rows = np.sort(np.minimum(every, end[:, None]), axis=1)
-    x, w = gauss_legendre(_ORDER)
-    half = 0.5 * np.diff(rows, axis=1)[:, :, None]
-    nodes = rows[:, :-1, None] + half * (1 + x)
-    return nodes.reshape(end.size, -1), (half * w).reshape(end.size, -1)
+    return gauss_panels(rows, _ORDER)
 
 
 def _growing(first: float, end: float) -> Array:
     """Return 0, then points that grow by a factor from the first to the end."""
     count = max(1, int(np.ceil(np.log(end / first) / np.log(_GROWTH))))
     return np.concatenate([[0.0], np.geomspace(first, end, count + 1)])
-
-
-def _gauss(edges: Array) -> tuple[Array, Array]:
-    x, w = gauss_legendre(_ORDER)
-    half = 0.5 * np.diff(edges)[:, None]
-    return (edges[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
 
 
 def _around_mirror(model: FurnaceModel, cosine: float) -> float:
@@ -231,4 +222,4 @@ def _rings(grazing: float, width: float) -> tuple[Array, Array]:
         [grazing - lobe, grazing + lobe, grazing - root, grazing + root, end - root]
     )
     edges = np.unique(np.concatenate([lobe, near[(near > 0) & (near < end)]]))
-    return _gauss(edges)
+    return gauss_panels(edges, _ORDER)

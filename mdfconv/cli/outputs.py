@@ -29,10 +29,10 @@ def check_outputs(*outputs: Path | None, inputs: Sequence[Path] = ()) -> list[Pa
             raise MdfconvError(f"{path} is the input", "write to another file")
         if path.is_dir():
             raise MdfconvError(f"cannot write {path}: Is a directory")
-        folder = path.resolve().parent
-        if not is_stream(path) and not folder.is_dir():
+        place = path if is_stream(path) else path.resolve().parent
+        if place != path and not place.is_dir():
             raise MdfconvError(f"cannot write {path}: {path.parent} is not an existing directory")
-        if not os.access(path if is_stream(path) else folder, os.W_OK):
+        if not os.access(place, os.W_OK):
             raise MdfconvError(f"cannot write {path}: Permission denied")
     return named
 

@@ -77,7 +77,7 @@ def convert(
     >>> convert([100, 1000], "blinn-phong", "ggx", method="half-angle").round(4)
     array([0.1794, 0.0577])
     """
-    ends = endpoints(source, target, fixed_gamma(gamma))
+    ends = endpoints(source, target, given_gamma(gamma))
     rule = chosen_method(method, *ends, gamma)
     kept = metric_named(metric)
     if not isinstance(values, tuple):
@@ -95,7 +95,7 @@ def convert(
     return _convert(x, rule, kept, *ends), _convert(y, rule, kept, *ends)
 
 
-def fixed_gamma(gamma: Gamma) -> float | None:
+def given_gamma(gamma: Gamma) -> float | None:
     """Return γ, None if it is free; raise `MdfconvError` for any other word."""
     if not isinstance(gamma, str):
         return gamma

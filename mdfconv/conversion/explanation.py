@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from mdfconv.conversion.arrays import Gamma, apply, apply_free, chosen_method, fixed_gamma
+from mdfconv.conversion.arrays import Gamma, apply, apply_free, chosen_method, given_gamma
 from mdfconv.conversion.endpoint import Endpoint, endpoints
 from mdfconv.conversion.equivalence import exact_route
 from mdfconv.conversion.method import Method
@@ -103,7 +103,7 @@ def explain(
     MdfconvError
         As `convert`.
     """
-    ends = endpoints(source, target, fixed_gamma(gamma))
+    ends = endpoints(source, target, given_gamma(gamma))
     rule, kept = chosen_method(method, *ends, gamma), metric_named(metric)
     axes = _axes(values, *ends)
     parameter = ends[0].decode([value for pair in axes for value in pair])

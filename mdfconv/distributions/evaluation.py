@@ -149,3 +149,24 @@ def gauss_legendre(order: int) -> tuple[Array, Array]:
     nodes, weights = np.polynomial.legendre.leggauss(order)
     nodes.flags.writeable = weights.flags.writeable = False
     return nodes, weights
+
+
+def gauss_panels(edges: Array, order: int) -> tuple[Array, Array]:
+    """Return Gauss-Legendre nodes and weights on the panels between sorted edges.
+
+    Parameters
+    ----------
+    edges : numpy.ndarray, shape (..., n + 1)
+        Where the panels begin and end.
+    order : int
+        Nodes a panel.
+
+    Returns
+    -------
+    nodes, weights : numpy.ndarray, shape (..., n * order)
+    """
+    x, w = gauss_legendre(order)
+    half = 0.5 * np.diff(edges)[..., None]
+    nodes = edges[..., :-1, None] + half * (1 + x)
+    shape = (*edges.shape[:-1], -1)
+    return nodes.reshape(shape), (half * w).reshape(shape)

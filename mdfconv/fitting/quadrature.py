@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from mdfconv.distributions.evaluation import Array, Indices, gauss_legendre
+from mdfconv.distributions.evaluation import Array, Indices, gauss_panels
 
 # Panels from a thousandth of the half width to the horizon, the widest factor between two of
 # them 2 for a mirror of 1e-8; towards π/2, where powers of cos β are not smooth, they shrink by 4.
@@ -52,11 +52,11 @@ class LobeQuadrature:
         edges = self._edges[rows]
         if breaks is not None:
             edges = np.sort(np.concatenate([edges, breaks], axis=1), axis=1)
-        return _panels(edges, _ORDER)
+        return gauss_panels(edges, _ORDER)
 
     def coarse(self, rows: Indices, *, fine: bool = False) -> tuple[Array, Array]:
         """Return the panels at a low order."""
-        return _panels(self._edges[rows], _ORDER if fine else _SCAN_ORDER)
+        return gauss_panels(self._edges[rows], _ORDER if fine else _SCAN_ORDER)
 
 
 class UniformSamples:
@@ -83,12 +83,3 @@ class UniformSamples:
         count = self._beta.shape[1]
         beta = self._beta[rows, :: max(1, count // _SCAN_SAMPLES)]
         return beta, np.full_like(beta, count / beta.shape[1])
-
-
-def _panels(edges: Array, order: int) -> tuple[Array, Array]:
-    """Return Gauss-Legendre nodes and weights on the panels between sorted edges."""
-    x, w = gauss_legendre(order)
-    half = 0.5 * np.diff(edges, axis=1)[:, :, None]
-    middle = edges[:, :-1, None] + half
-    rows = edges.shape[0]
-    return (middle + half * x).reshape(rows, -1), (half * w).reshape(rows, -1)

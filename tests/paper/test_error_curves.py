@@ -2,7 +2,6 @@
 
 import csv
 import json
-import os
 
 import numpy as np
 import pytest
@@ -65,53 +64,3 @@ def test_plot_error_options(tmp_path):
         "error-m_b-0.1.svg", "error-m_b-0.1b.csv", "error-m_b-0.9.svg", "error-m_b-0.9b.csv",
     ]  # fmt: skip
     assert len((tmp_path / "error-m_b-0.1b.csv").read_text().splitlines()) == 52
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("plot-error", "--output", "missing"), "not an existing directory"),
-        (("plot-error", "--mdf", "gx"), "did you mean ggx"),
-        (("plot-error", "--reference", "smoothie"), "give --m-b"),
-        (("plot-error", "--m-b", "-1"), "m_B > 0"),
-        (("plot-error", "--m-b", "0.9"), "half-angle answers"),
-        (("plot-error", "--points", "1"), "from 2 to"),
-        (("plot-error", "--dpi", "0"), "--dpi"),
-        (("plot-error", "--mdf", "ashikhmin-shirley"), "blinn-phong"),
-    ],
-)
-def test_bad_requests_write_nothing(tmp_path, arguments, words):
-    status, out, err = run(*arguments, cwd=tmp_path)
-    assert (status, out) == (2, "")
-    assert words in err
-    assert err.count("\n") == 1
-    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
-
-
-def test_an_unwritable_folder(tmp_path):
-    blocked = tmp_path / "blocked"
-    blocked.write_text("a file where a folder should be")
-    status, out, err = run("plot-error", "--output", blocked)
-    assert (status, out) == (2, "")
-    assert err.count("\n") == 1
-    os.makedirs(tmp_path / "here" / "reports.d")
-    (tmp_path / "here" / "reports").write_text("in the way")
-    status, _, err = run("plot-error", cwd=tmp_path / "here")
-    assert status == 2
-    assert "cannot create" in err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("plot-error", "--method", "ward"), "give one"),
-        (("plot-error", "--mdf", "beckmann"), "is the reference"),
-        (("plot-error", "--points", "100000000000"), "from 2 to"),
-        (("konvert",), "did you mean convert"),
-    ],
-)
-def test_requests_that_would_mislead(tmp_path, arguments, words):
-    status, out, err = run(*arguments, cwd=tmp_path)
-    assert (status, out) == (2, "")
-    assert words in err
-    assert err.count("\n") == 1

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import os
 
 import numpy as np
 import pytest
@@ -219,56 +218,6 @@ def test_compare_a_material(tmp_path):
     assert (pixels[..., 0] - pixels[..., 2]).max() > 40
     section = list(csv.DictReader((tmp_path / "compare-m_b-0.2.csv").read_text().splitlines()))
     assert max(float(row["beckmann"]) for row in section) == pytest.approx(1, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("compare", "--output", "missing"), "not an existing directory"),
-        (("compare", "--size", "0"), "16 to 4096"),
-        (("compare", "--dpi", "-5"), "--dpi"),
-        (("compare", "--exposure", "0"), "exposure"),
-        (("compare", "--m-b", "nan"), "not a finite number"),
-        (("compare", "--light", "sun"), "'sun' is not one of"),
-        (("compare", "--mdf", "gx"), "did you mean ggx"),
-        (("compare", "--method", "wart"), "did you mean ward"),
-        (("compare", "--material", "golt"), "did you mean gold"),
-        (("compare", "--brdf", "phong"), "'phong' is not one of"),
-    ],
-)
-def test_bad_requests_write_nothing(tmp_path, arguments, words):
-    status, out, err = run(*arguments, cwd=tmp_path)
-    assert (status, out) == (2, "")
-    assert words in err
-    assert err.count("\n") == 1
-    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
-
-
-def test_an_unwritable_folder(tmp_path):
-    blocked = tmp_path / "blocked"
-    blocked.write_text("a file where a folder should be")
-    status, out, err = run("compare", "--output", blocked)
-    assert (status, out) == (2, "")
-    assert err.count("\n") == 1
-    os.makedirs(tmp_path / "here" / "reports.d")
-    (tmp_path / "here" / "reports").write_text("in the way")
-    status, _, err = run("compare", cwd=tmp_path / "here")
-    assert status == 2
-    assert "cannot create" in err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("compare", "--m-b", "1e-8"), "falls between the pixels"),
-        (("compare", "--m-b", "0.001", "--size", "64"), "falls between the pixels"),
-    ],
-)
-def test_requests_that_would_mislead(tmp_path, arguments, words):
-    status, out, err = run(*arguments, cwd=tmp_path)
-    assert (status, out) == (2, "")
-    assert words in err
-    assert err.count("\n") == 1
 
 
 def test_a_sheet_shows_the_pixels_asked_for(tmp_path):

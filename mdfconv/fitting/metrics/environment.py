@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.evaluation import Array, gauss_legendre
+from mdfconv.distributions.evaluation import Array, gauss_panels
 from mdfconv.fitting.metrics.base import Metric
 
 # The ratio of two parameters is found on ln tan β from −32 to 32: beyond, the shares of any two
@@ -44,8 +44,7 @@ class Environment(Metric):
     ) -> Array:
         """Return F − sin²β."""
         with np.errstate(all="ignore"):
-            share, _ = distribution.cumulative_with_slope(beta, parameter)
-        return share - np.square(np.sin(beta))
+            return self.signal_and_slope(distribution, beta, parameter, peak)[0]
 
     def signal_and_slope(
         self, distribution: Distribution, beta: Array, parameter: Array, peak: Array
@@ -70,18 +69,15 @@ def _ratio(source: Distribution, target: Distribution) -> float:
     """Return p_target/p_source where ∂/∂ ln p of the distance is 0, to the last digits."""
     from scipy.optimize import brentq
 
-    nodes, weights = gauss_legendre(_ORDER)
     edges = np.linspace(-_LOG_REACH, _LOG_REACH, _PANELS + 1)
-    half = 0.5 * np.diff(edges)[:, None]
-    log_tangent = (edges[:-1, None] + half * (1 + nodes)).ravel()[None, :]
-    weight = (half * weights).ravel()
+    log_tangent, weight = gauss_panels(edges[None, :], _ORDER)
     share, _ = source.cumulative_with_slope(np.arctan(np.exp(log_tangent)), np.ones((1, 1)))
 
     def slope(log_ratio: float) -> float:
         # The target at parameter 1, moved along the axis: a legal range does not matter.
         moved = np.arctan(np.exp(log_tangent - log_ratio))
         other, fall = target.cumulative_with_slope(moved, np.ones((1, 1)))
-        return float(weight @ ((other - share) * fall)[0])
+        return float(np.sum(weight * (other - share) * fall))
 
     return float(np.exp(brentq(slope, *_LOG_RATIOS, xtol=1e-16, rtol=1e-15)))
 

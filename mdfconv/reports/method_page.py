@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import permutations
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text, markdown_text
 from mdfconv.reports.artefact import Artefact
+from mdfconv.reports.prose import percent, wrapped
 
 # Beckmann's m_B for lobes of the same half width.
 _SWEEP, _ROUGHER = "paper's sweep, m_B 0.0045-0.447", "rougher, m_B 0.55-1"
@@ -46,7 +46,7 @@ def method_page() -> Artefact:
         "methods.md": file_bytes(f"{prose}\n\n{markdown_text(columns, table)}"),
     }
     medians = [
-        f"{_percent(rows[_SWEEP, name, 'closed-form']['median'])} ({name})"
+        f"{percent(rows[_SWEEP, name, 'closed-form']['median'])} ({name})"
         for name in list_metrics()
     ]
     return Artefact(
@@ -110,11 +110,6 @@ def _worst_closed_forms(errors: _Errors) -> list[float]:
     return worst
 
 
-def _percent(share: float) -> str:
-    """Return a share in two digits; no line breaks before its sign."""
-    return f"{float(f'{100 * share:.2g}'):g}\N{NO-BREAK SPACE}%"
-
-
 def _prose(
     rows: dict[tuple[str, str, str], dict[str, Any]],
     worst: Sequence[float],
@@ -130,22 +125,19 @@ def _prose(
     text = _PROSE.format(
         count=count,
         left_out=" and ".join(dict.fromkeys(left_out)),
-        shape=_percent(rows[_SWEEP, "unit", "closed-form"]["median"]),
-        borrowed=_percent(worst[False]),
-        own=_percent(worst[True]),
-        half_angle=_percent(rows[_SWEEP, "unit", "half-angle"]["median"]),
-        light=_percent(rows[_SWEEP, "energy", "closed-form"]["median"]),
+        shape=percent(rows[_SWEEP, "unit", "closed-form"]["median"]),
+        borrowed=percent(worst[False]),
+        own=percent(worst[True]),
+        half_angle=percent(rows[_SWEEP, "unit", "half-angle"]["median"]),
+        light=percent(rows[_SWEEP, "energy", "closed-form"]["median"]),
         light_method=light["method"],
-        light_median=_percent(light["median"]),
+        light_median=percent(light["median"]),
         light_rmse=f"{light['excess_rmse_worst']:.2g}",
         picture_method=picture["method"],
-        picture_median=_percent(picture["median"]),
-        missing=f"{_percent(min(missing))} to {_percent(max(missing))}",
+        picture_median=percent(picture["median"]),
+        missing=f"{percent(min(missing))} to {percent(max(missing))}",
     )
-    return "\n".join(
-        fill(line, 100, subsequent_indent="  " * line.startswith("- "), break_on_hyphens=False)
-        for line in text.splitlines()
-    )
+    return wrapped(text)
 
 
 # A paragraph, or an item of the list, in a line.

@@ -11,6 +11,7 @@ from mdfconv.benchmark.stability_finding import Finding
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text, markdown_text
 from mdfconv.reports.artefact import Artefact
+from mdfconv.reports.prose import enumeration
 
 _COLUMNS = ("distribution", "rule", "regime", "dtype", "cases", "out_of_range", "error", "textbook")
 _KERNELS = ("unit", "normalized")
@@ -85,11 +86,12 @@ def _kernel_prose(findings: Sequence[Finding]) -> str:
     }
     losing = [name for name, error in smooth.items() if error in (_NO_DIGIT, _FAILS)]
     sound = [name for name in smooth if name not in losing]
+    spoiled, kept = enumeration(losing), enumeration(sound)
     return fill(
         "Roughness is 0.01 or more in `usual` (N up to 20000) and 0.001 down to 1e-8 in "
-        f"`mirror-smooth` (N up to 1e16). {_and(losing)} as printed lose their digits as a surface "
+        f"`mirror-smooth` (N up to 1e16). {spoiled} as printed lose their digits as a surface "
         "becomes smoother, the last of them in `mirror-smooth`, even in float64. The forms used "
-        f"here keep them in every type. {_and(sound)} as printed are as good in float64 and "
+        f"here keep them in every type. {kept} as printed are as good in float64 and "
         "float32; only float16, in which the square of a roughness already underflows, spoils "
         "them. `tail` is D̄ below 1e-6, where an exponential multiplies the rounding of its "
         "exponent, whoever computes it. `edge of support` is the end of Schlick's lobe, both sides "
@@ -118,10 +120,6 @@ def _conversion_prose(findings: Sequence[Finding]) -> str:
         100,
         break_on_hyphens=False,
     )
-
-
-def _and(names: Sequence[str]) -> str:
-    return " and ".join([", ".join(names[:-1])] * (len(names) > 1) + list(names[-1:]))
 
 
 def _row(finding: Finding) -> Row:

@@ -28,6 +28,7 @@ ABOUT_PARTICULAR_ONES = {
     "brdf/reflection.py": "the definitions of BRDFs",
     "brdf/microsurface.py": "the sampler of Heitz 2018, which is that of an ellipsoid",
     "reports/furnace_page.py": "the names of BRDFs",
+    "reports/lights_page.py": "the pair that was rendered, and laws of particular pairs",
     "cli/furnace_command.py": "the names of BRDFs",
     "cli/compare_command.py": "the names of BRDFs",
     "scene/shininess.py": "the definition of Wavefront's Ns and Pr",

@@ -16,6 +16,7 @@ from mdfconv.reports.artefact import Artefact
 from mdfconv.reports.fresnel_page import fresnel_page
 from mdfconv.reports.furnace_page import furnace_page
 from mdfconv.reports.importer_page import importer_page
+from mdfconv.reports.lights_page import lights_page
 from mdfconv.reports.method_page import method_page
 from mdfconv.reports.stability_page import stability_page
 
@@ -26,6 +27,7 @@ _ARTEFACTS: tuple[Callable[[], Artefact], ...] = (
     paper_pages.error_figures,
     paper_pages.pictures,
     method_page,
+    lights_page,
     importer_page,
     furnace_page,
     fresnel_page,

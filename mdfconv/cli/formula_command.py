@@ -48,14 +48,18 @@ def command(
         str, typer.Option("--lang", metavar="LANG", help="glsl, hlsl, c, python or latex.")
     ] = "glsl",
     every: Annotated[
-        bool, typer.Option("--all", help="Print the table of cost against error instead.")
+        bool,
+        typer.Option(
+            "--all", help="Print the table of cost against error instead, in that language."
+        ),
     ] = False,
     format_: FormatOption = None,
 ) -> None:
     """Print the cheapest formula for a conversion, to paste into a shader or an importer.
 
     Searches powers of polynomials and rational functions for the fewest operations whose worst
-    relative error against the fit, in single precision, is within the tolerance.
+    relative error against the fit, in single precision, is within the tolerance. A value outside
+    the range gives what the nearest end of it gives.
 
     Examples:
 
@@ -65,7 +69,7 @@ def command(
 
     mdfconv formula --from ggx --to beckmann --tolerance 1e-4 --range 0.05:0.5 --lang c
 
-    mdfconv formula --from blinn-phong --to ggx --metric energy --all
+    mdfconv formula --from blinn-phong --to ggx --metric energy --all --lang latex
     """
     from mdfconv.conversion.endpoint import endpoints
     from mdfconv.formula import LANGUAGES, Problem, cheapest, write_formula
@@ -78,7 +82,7 @@ def command(
     problem = Problem(*ends, chosen_metric(metric, exposure), low, high)
     if every:
         title = f"Formulas from {ends[0].label} to {ends[1].label}, {low:g} to {high:g}"
-        write_table(_COLUMNS, _rows(problem), format_, title=title)
+        write_table(_COLUMNS, _rows(problem, language), format_, title=title)
     else:
         typer.echo(write_formula(cheapest(problem, tolerance), problem, language))
 
@@ -94,15 +98,14 @@ def _range(text: str) -> tuple[float, float]:
     return ends
 
 
-def _rows(problem: Problem) -> list[dict[str, Any]]:
-    from mdfconv.formula import pareto_front
-    from mdfconv.formula.languages import latex
+def _rows(problem: Problem, language: str) -> list[dict[str, Any]]:
+    from mdfconv.formula import LANGUAGES, pareto_front
 
     return [
         {
             "operations": formula.shape.operations,
             "worst_error": float(f"{formula.error:.3g}"),
-            "formula": latex(formula, problem),
+            "formula": LANGUAGES[language].one_line(formula, problem),
         }
         for formula in pareto_front(problem)
     ]

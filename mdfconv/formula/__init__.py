@@ -3,7 +3,7 @@
 `cheapest` finds one for a pair, a range and a tolerance, `write_formula` gives the code.
 """
 
-from mdfconv.formula.languages import LANGUAGES, latex, write_formula
+from mdfconv.formula.languages import LANGUAGES, write_formula
 from mdfconv.formula.search import Problem, cheapest, pareto_front
 
-__all__ = ["LANGUAGES", "Problem", "cheapest", "latex", "pareto_front", "write_formula"]
+__all__ = ["LANGUAGES", "Problem", "cheapest", "pareto_front", "write_formula"]

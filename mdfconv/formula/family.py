@@ -4,6 +4,7 @@
 
 w is what the source stores, or 1 − it for a glossiness, and t the same of the target. Lobes are
 similar to each other, so that a good exponent e and a good factor wᶠ leave P and Q little to do.
+What is stored is first clamped to the range: outside, a formula may be 0, infinite or no number.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from mdfconv.distributions.evaluation import Array
 
 # The price of ÷, √ and 1/√ against that of +, − and ×, as on graphics processors.
 SLOW = 4
+# A clamp is a minimum and a maximum, each as cheap as +.
+CLAMP = 2
 # Prices of raising to these powers.
 POWERS = {
     -2.0: SLOW + 1,
@@ -58,16 +61,30 @@ class Shape:
     denominator: int = 0
 
     @property
+    def has_terms(self) -> bool:
+        """Whether P or Q depends on the variable."""
+        return self.numerator > 1 or self.denominator > 0
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether t is one number for every w, so that there is nothing to clamp."""
+        return not (self.has_terms or self.factor)
+
+    @property
+    def shares_factor(self) -> bool:
+        """Whether the factor wᶠ is the variable wᵏ of P and Q, which the code has already."""
+        return self.has_terms and self.factor == self.variable
+
+    @property
     def operations(self) -> int:
-        """The price: + − × count 1 each, ÷ √ 1/√ count 4 each."""
-        has_terms = self.numerator > 1 or self.denominator > 0
+        """The price: + − × count 1 each, the clamp of the input 2, ÷ √ 1/√ count 4 each."""
         steps = self.numerator - 1 + self.denominator
         price = 2 * steps + _OUTER[self.outer]
+        price += 0 if self.is_constant else CLAMP
         price += SLOW if self.denominator else 0
-        price += POWERS[self.variable] if has_terms else 0
+        price += POWERS[self.variable] if self.has_terms else 0
         if self.factor:
-            shared = has_terms and self.factor == self.variable
-            price += 1 + (0 if shared else POWERS[self.factor])
+            price += 1 + (0 if self.shares_factor else POWERS[self.factor])
         return price
 
 

@@ -25,7 +25,7 @@ from mdfconv.registry import Registry
 # What an argument cannot be called: words of the emitted code, and of the languages. Words with
 # digits or capitals are not listed, as no argument has any.
 _WORDS = """
-    u v w sqrt sqrtf rsqrt inversesqrt
+    u v w sqrt sqrtf rsqrt inversesqrt clamp fminf fmaxf np
 
     active alignas alignof asm asm_fragment atomic_uint attribute auto bool break buffer case cast
     catch cbuffer centroid char class coherent column_major common compile compile_fragment const
@@ -59,6 +59,10 @@ class Language(ABC):
     def lines(self, formula: Formula, problem: Problem) -> list[str]:
         """Return the lines of a formula, without the comment before it."""
 
+    @abstractmethod
+    def one_line(self, formula: Formula, problem: Problem) -> str:
+        """Return what the formula computes in a single line, for a table."""
+
 
 @dataclass(frozen=True)
 class Dialect(Language):
@@ -68,21 +72,24 @@ class Dialect(Language):
     ----------
     comment : str
         What starts a comment line.
-    head, declare, give, foot : str
+    head, declare, end, foot : str
         The line of the function with {name} and {argument}; a constant with {name} and {value};
-        the result with {value}; what ends the function.
-    number, root, inverse_root : callable
-        A number in single precision, √ and 1/√ of an expression.
+        what ends a statement; what ends the function.
+    number : callable
+        A number in single precision.
+    clamp, root, inverse_root : str
+        An expression clamped to a lower and an upper bound; √ and 1/√ of an expression.
     include : str
-        A line that must stand before the function.
+        What must stand before the function.
     """
 
     comment: str
     head: str
     declare: str
-    give: str
+    end: str
     foot: str
     number: Callable[[float], str]
+    clamp: str
     root: str
     inverse_root: str
     include: str = ""
@@ -90,14 +97,21 @@ class Dialect(Language):
     def lines(self, formula: Formula, problem: Problem) -> list[str]:
         """Return the lines of a function of the source's stored value."""
         argument = argument_name(problem.source.stored.name)
-        constants, result = _body(formula, problem, self, argument)
         return [
             *([self.include] if self.include else []),
             self.head.format(name=function_name(problem), argument=argument),
-            *(self.declare.format(name=name, value=value) for name, value in constants),
-            self.give.format(value=result),
+            *(f"    {statement}{self.end}" for statement in self._statements(formula, problem)),
             *([self.foot] if self.foot else []),
         ]
+
+    def one_line(self, formula: Formula, problem: Problem) -> str:
+        """Return the statements of the function."""
+        return "; ".join(self._statements(formula, problem))
+
+    def _statements(self, formula: Formula, problem: Problem) -> list[str]:
+        constants, result = _body(formula, problem, self)
+        declared = [self.declare.format(name=name, value=value) for name, value in constants]
+        return [*declared, f"return {result}"]
 
 
 class Latex(Language):
@@ -106,8 +120,32 @@ class Latex(Language):
     comment = "%"
 
     def lines(self, formula: Formula, problem: Problem) -> list[str]:
-        """Return the one line of an equation."""
-        return [latex(formula, problem)]
+        """Return the one line of an equation, with the range in which it holds."""
+        low, high = _latex_number(problem.low), _latex_number(problem.high)
+        condition = rf"{low} \le {_latex_symbol(problem.source)} \le {high}"
+        return [rf"{self.one_line(formula, problem)}, \quad {condition}"]
+
+    def one_line(self, formula: Formula, problem: Problem) -> str:
+        """Return the equation."""
+        shape = formula.shape
+        symbol = _latex_symbol(problem.source)
+        base = f"(1 - {symbol})" if is_glossy(problem.source) else symbol
+        value = _latex_polynomial(formula.numerator, base, shape.variable)
+        if formula.denominator:
+            down = _latex_polynomial((1.0, *formula.denominator), base, shape.variable)
+            value = rf"\frac{{{value}}}{{{down}}}"
+        elif shape.factor and shape.has_terms:
+            value = rf"\left({value}\right)"
+        if shape.factor and not shape.has_terms:
+            value = f"{value} {_latex_power(base, shape.factor)}"
+        elif shape.factor:
+            value = f"{_latex_power(base, shape.factor)} {value}"
+        if shape.outer != 1:
+            value = rf"\left({value}\right)^{{{_exponent(shape.outer)}}}"
+        elif is_glossy(problem.target):
+            value = rf"\left({value}\right)"
+        start = "1 - " if is_glossy(problem.target) else ""
+        return f"{_latex_symbol(problem.target)} = {start}{value}"
 
 
 def _plain(value: float) -> str:
@@ -117,20 +155,32 @@ def _plain(value: float) -> str:
 _SHADER = {
     "comment": "//",
     "head": "float {name}(float {argument}) {{",
-    "declare": "    float {name} = {value};",
-    "give": "    return {value};",
+    "declare": "float {name} = {value}",
+    "end": ";",
     "foot": "}",
 }
+_CLAMP = "clamp({}, {}, {})"
 LANGUAGES: Registry[Language] = Registry("language")
 LANGUAGES.add(
-    "glsl", Dialect(**_SHADER, number=_plain, root="sqrt({})", inverse_root="inversesqrt({})")
+    "glsl",
+    Dialect(
+        **_SHADER,
+        number=_plain,
+        clamp=_CLAMP,
+        root="sqrt({})",
+        inverse_root="inversesqrt({})",
+    ),
 )
-LANGUAGES.add("hlsl", Dialect(**_SHADER, number=_plain, root="sqrt({})", inverse_root="rsqrt({})"))
+LANGUAGES.add(
+    "hlsl",
+    Dialect(**_SHADER, number=_plain, clamp=_CLAMP, root="sqrt({})", inverse_root="rsqrt({})"),
+)
 LANGUAGES.add(
     "c",
     Dialect(
         **_SHADER,
         number=lambda value: f"{_plain(value)}f",
+        clamp="fminf(fmaxf({}, {}), {})",
         root="sqrtf({})",
         inverse_root="1.0f / sqrtf({})",
         include="#include <math.h>",
@@ -141,12 +191,15 @@ LANGUAGES.add(
     Dialect(
         comment="#",
         head="def {name}({argument}):",
-        declare="    {name} = {value}",
-        give="    return {value}",
+        declare="{name} = {value}",
+        end="",
         foot="",
         number=_plain,
+        # min and max of the language are for numbers alone.
+        clamp="np.clip({}, {}, {})",
         root="{} ** 0.5",
         inverse_root="{} ** -0.5",
+        include="import numpy as np\n\n",
     ),
 )
 LANGUAGES.add("latex", Latex())
@@ -213,10 +266,11 @@ def _facts(formula: Formula, problem: Problem) -> list[str]:
     metric = problem.metric
     of = " of 1 - g" if is_glossy(problem.target) else ""
     return [
-        f"{source} to {target}, for {number_text(problem.low)} to {number_text(problem.high)}.",
+        f"{source} to {target}, for {number_text(problem.low)} to {number_text(problem.high)}; "
+        "outside, the input is clamped.",
         f"Least squares under the {metric} metric: keeps the {metric.keeps}.",
         f"Worst relative error{of} {formula.error:.2g} in float32; {formula.shape.operations} "
-        "operations (+ - * count 1; / sqrt 1/sqrt count 4).",
+        "operations (+ - * count 1, clamp 2, / sqrt 1/sqrt 4).",
         f"By mdfconv {__version__}.",
     ]
 
@@ -228,7 +282,7 @@ def _end_text(end: Endpoint) -> str:
 
 
 def _body(
-    formula: Formula, problem: Problem, dialect: Dialect, argument: str
+    formula: Formula, problem: Problem, dialect: Dialect
 ) -> tuple[list[tuple[str, str]], str]:
     """Return the constants of the function and the expression of its result."""
     shape = formula.shape
@@ -239,15 +293,16 @@ def _body(
         constants.append((name, value))
         return name
 
-    w = named("w", f"{one} - {argument}") if is_glossy(problem.source) else argument
-    has_terms = len(formula.numerator) > 1 or bool(formula.denominator)
+    w = argument_name(problem.source.stored.name)
+    if not shape.is_constant:
+        clamped = dialect.clamp.format(w, dialect.number(problem.low), dialect.number(problem.high))
+        w = named("w", f"{one} - {clamped}" if is_glossy(problem.source) else clamped)
     u = w
-    if has_terms and shape.variable != 1:
+    if shape.has_terms and shape.variable != 1:
         u = named("u", _raised(w, shape.variable, dialect, named))
     value = _horner(formula.numerator, u, dialect)
     if shape.factor:
-        shared = has_terms and shape.factor == shape.variable
-        factor = u if shared else _raised(w, shape.factor, dialect, named)
+        factor = u if shape.shares_factor else _raised(w, shape.factor, dialect, named)
         value = f"{factor} * {_enclosed(value)}"
     if formula.denominator:
         down = _horner((1.0, *formula.denominator), u, dialect)
@@ -288,39 +343,20 @@ def _horner(coefficients: tuple[float, ...], u: str, dialect: Dialect) -> str:
     return value
 
 
-def latex(formula: Formula, problem: Problem) -> str:
-    """Return a formula as LaTeX, without a comment."""
-    shape = formula.shape
-    symbol = _latex_symbol(problem.source)
-    base = f"(1 - {symbol})" if is_glossy(problem.source) else symbol
-    value = _latex_polynomial(formula.numerator, base, shape.variable)
-    if formula.denominator:
-        down = _latex_polynomial((1.0, *formula.denominator), base, shape.variable)
-        value = rf"\frac{{{value}}}{{{down}}}"
-    elif shape.factor and len(formula.numerator) > 1:
-        value = rf"\left({value}\right)"
-    if shape.factor and len(formula.numerator) == 1 and not formula.denominator:
-        value = f"{value} {_latex_power(base, shape.factor)}"
-    elif shape.factor:
-        value = f"{_latex_power(base, shape.factor)} {value}"
-    if shape.outer != 1:
-        value = rf"\left({value}\right)^{{{_exponent(shape.outer)}}}"
-    elif is_glossy(problem.target):
-        value = rf"\left({value}\right)"
-    start = "1 - " if is_glossy(problem.target) else ""
-    return f"{_latex_symbol(problem.target)} = {start}{value}"
-
-
 def _latex_symbol(end: Endpoint) -> str:
     head, _, tail = _ascii(end.stored.symbol, r"\{}").partition("_")
     return f"{head}_{{{tail}}}" if tail else head
 
 
+def _latex_number(value: float) -> str:
+    head, _, tail = _plain(value).partition("e")
+    return rf"{head} \cdot 10^{{{int(tail)}}}" if tail else head
+
+
 def _latex_polynomial(coefficients: tuple[float, ...], base: str, exponent: float) -> str:
     text = ""
     for index, coefficient in enumerate(coefficients):
-        head, _, tail = _plain(abs(coefficient)).partition("e")
-        number = rf"{head} \cdot 10^{{{int(tail)}}}" if tail else head
+        number = _latex_number(abs(coefficient))
         sign = "-" if coefficient < 0 else "+"
         factor = rf" {_latex_power(base, index * exponent)}" if index else ""
         text += f" {sign} {number}{factor}" if text else f"{'-' * (sign == '-')}{number}{factor}"

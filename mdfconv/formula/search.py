@@ -42,7 +42,7 @@ class Problem:
     metric : Metric
         The metric of the fit.
     low, high : float
-        The range of the source's stored value.
+        The range of the source's stored value, to which the code clamps it.
 
     Raises
     ------
@@ -58,7 +58,9 @@ class Problem:
 
     def __post_init__(self) -> None:
         self.source.decode([self.low, self.high])
-        if not self.low < self.high:
+        # Rounding may have taken an end to 0, to infinity, or a glossiness to 1.
+        self.source.decode(self.bounds)
+        if not self.bounds[0] < self.bounds[1]:
             raise MdfconvError(
                 f"the range {self.low:g}:{self.high:g} is empty", "the smaller value comes first"
             )
@@ -66,15 +68,25 @@ class Problem:
             raise MdfconvError("a formula needs two distributions; an encoding has its own")
 
     @cached_property
+    def bounds(self) -> Array:
+        """The ends of the range in float32, to which the code clamps its input."""
+        with np.errstate(over="ignore"):
+            return np.array([self.low, self.high], np.float32)
+
+    def clamped(self, stored: Array) -> Array:
+        """Return stored values of the source clamped to the range, in their type."""
+        return np.clip(stored, *self.bounds)
+
+    @cached_property
     def samples(self) -> tuple[Array, Array]:
         """Return w and t of the fits, at points that crowd towards the ends of the range."""
         from mdfconv.fitting.fit import fit
 
-        ends = np.log(natural(self.source, np.array([self.low, self.high])))
+        ends = np.log(natural(self.source, self.bounds.astype(float)))
         turn = np.cos(np.pi * np.arange(_FITS) / (_FITS - 1))
         w = np.exp(ends.mean() + 0.5 * (ends[1] - ends[0]) * turn[::-1])
         w[[0, -1]] = np.exp(ends)
-        parameter = self.source.decode(np.clip(natural(self.source, w), self.low, self.high))
+        parameter = self.source.decode(self.clamped(natural(self.source, w)))
         pair = self.source.distribution, self.target.distribution
         best = fit(pair[0], parameter, pair[1], self.metric).parameter
         t = natural(self.target, self.target.encode(best))
@@ -89,14 +101,16 @@ class Problem:
 
     @cached_property
     def checks(self) -> tuple[Array, Array]:
-        """Return w in float32 and t of the fit there, densely over the range."""
+        """Return w in float32, as the code has it, and t of the fit, densely over the range."""
         from scipy.interpolate import make_interp_spline
 
         w, t = self.samples
         order = np.argsort(w)
         spline = make_interp_spline(np.log(w[order]), np.log(t[order]), _SPLINE_DEGREE)
-        dense = np.geomspace(w.min(), w.max(), _CHECKS).astype(np.float32)
-        return dense, np.exp(spline(np.log(dense.astype(float))))
+        dense = natural(self.source, np.geomspace(w.min(), w.max(), _CHECKS))
+        stored = self.clamped(dense.astype(np.float32))
+        exact = np.exp(spline(np.log(natural(self.source, stored.astype(float)))))
+        return natural(self.source, stored), exact
 
 
 def is_glossy(end: Endpoint) -> bool:

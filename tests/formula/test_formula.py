@@ -116,6 +116,38 @@ def test_python_runs_on_numbers_and_arrays(solved, wanted):
     assert function(float(values[5])) == pytest.approx(got[5], rel=1e-12)
 
 
+def outside(problem):
+    """Return values beyond the range, and the end of it that is nearest to each."""
+    below = [0.0, -0.0, -1.0, -math.inf, 0.5 * problem.low]
+    above = [2.0 * problem.high, 1e30, math.inf]
+    return below + above, [problem.low] * len(below) + [problem.high] * len(above)
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_c_gives_the_nearest_end_outside_the_range(solved, tmp_path, compiler):
+    problem, formula, _ = solved
+    call = compiled(compiler, write_formula(formula, problem, "c"), tmp_path)
+    beyond, ends = outside(problem)
+    assert list(map(call, beyond)) == list(map(call, ends))
+    assert call(math.nan) == call(problem.low)
+
+
+def test_python_gives_the_nearest_end_outside_the_range(solved):
+    problem, formula, _ = solved
+    code = write_formula(formula, problem, "python")
+    scope = {}
+    exec(code, scope)
+    function = scope[function_name(code)]
+    beyond, ends = outside(problem)
+    assert list(map(function, beyond)) == list(map(function, ends))
+    np.testing.assert_array_equal(function(np.array(beyond)), function(np.array(ends)))
+    single = function(np.array(beyond, np.float32))
+    assert single.dtype == np.float32
+    np.testing.assert_array_equal(single, function(np.array(ends, np.float32)))
+    assert function(0) == function(problem.low)
+    assert math.isnan(function(math.nan))
+
+
 @pytest.mark.parametrize("validator", VALIDATORS)
 def test_shaders_validate(solved, tmp_path, validator):
     problem, formula, _ = solved
@@ -146,13 +178,16 @@ def test_latex_says_the_same(solved):
     assert text.count(r"\left(") == text.count(r"\right)")
     for coefficient in formula.numerator:
         assert str(np.float32(abs(coefficient))).partition("e")[0] in text
+    condition = re.sub(r" \\cdot 10\^{(.*?)}", r"e\1", text.partition(r"\quad ")[2])
+    low, _, high = condition.split(r" \le ")
+    assert (float(low), float(high)) == (problem.low, problem.high)
 
 
 def test_the_comment_states_what_was_promised(solved):
     problem, formula, _ = solved
     code = write_formula(formula, problem, "c")
     assert code.isascii()
-    assert f"for {problem.low:.10g} to {problem.high:.10g}" in code
+    assert f"for {problem.low:.10g} to {problem.high:.10g}; outside, the input is clamped" in code
     assert f"the {problem.metric} metric" in code
     assert f"{formula.error:.2g} in float32" in code
     assert f"{formula.shape.operations} operations" in code
@@ -164,14 +199,23 @@ def test_operations_are_those_of_the_code(solved):
     body = " ".join(line for line in lines if line.startswith("    "))
     cheap = sum(body.count(f" {sign} ") for sign in "+-*")
     slow = body.count(" / ") + body.count("sqrt(")
+    assert body.count("clamp(") == 1
     glossy = [problem.source.stored.name, problem.target.stored.name].count("glossiness")
-    assert cheap + 4 * slow == formula.shape.operations + glossy
+    assert cheap + 4 * slow + 2 == formula.shape.operations + glossy
 
 
 @pytest.fixture(scope="module")
 def simple():
     problem = Problem(*endpoints("blinn-phong", "ggx"), metric_named("energy"), 1, 1e4)
     return problem, cheapest(problem, 0.1)
+
+
+def test_a_constant_has_nothing_to_clamp(simple):
+    problem, _ = simple
+    formula = cheapest(problem, 1)
+    assert formula.shape.operations == 0
+    for language in ("glsl", "hlsl", "c", "python"):
+        assert LANGUAGES[language].one_line(formula, problem).startswith("return 0.")
 
 
 def test_the_comment_spells_the_metrics_setting(simple):
@@ -191,8 +235,9 @@ def stored_as(name, **options):
 
 @pytest.mark.parametrize(
     "name",
-    ["scale", "u", "v", "w", "w2", "sqrt", "half", "lambda", "float", "float3", "sample", "in",
-     "m_B", "mean slope", "α", "2nd", "input", "register", "row__major", "Texture"],
+    ["scale", "u", "v", "w", "w2", "sqrt", "clamp", "fminf", "np", "half", "lambda", "float",
+     "float3", "sample", "in", "m_B", "mean slope", "α", "2nd", "input", "register", "row__major",
+     "Texture"],
 )  # fmt: skip
 def test_any_name_of_a_parameter_is_valid_code(name, tmp_path):
     # Of all shapes the one that needs most names: 1 − w⁴ under a root.
@@ -312,13 +357,38 @@ def test_command():
     words = ["formula", "--from", "blinn-phong", "--to", "ggx:roughness", "--metric", "energy"]
     status, out, err = run(*words)
     assert (status, err) == (0, "")
-    assert out.startswith("// blinn-phong N to ggx:roughness r, for 1 to 10000.\n")
+    assert out.startswith("// blinn-phong N to ggx:roughness r, for 1 to 10000; outside")
     assert "inversesqrt" in out
     assert "rsqrt" in run(*words, "--lang", "HLSL")[1]
-    status, out, err = run(*words, "--all")
+    assert run(*words, "--all")[1].startswith("operations,worst_error,formula\n0,0.77,return 0.2")
+
+
+ONE_LINE = {
+    "glsl": "float w = clamp(exponent, 1.0, 10000.0); float v = {} + w * {}; return inversesqrt(v)",
+    "hlsl": "float w = clamp(exponent, 1.0, 10000.0); float v = {} + w * {}; return rsqrt(v)",
+    "c": "float w = fminf(fmaxf(exponent, 1.0f), 10000.0f); float v = {}f + w * {}f; "
+    "return 1.0f / sqrtf(v)",
+    "python": "w = np.clip(exponent, 1.0, 10000.0); v = {} + w * {}; return v ** -0.5",
+    "latex": r"\alpha = \left({} + {} N\right)^{{-1/2}}",
+}
+
+
+@pytest.mark.parametrize("language", LANGUAGES.names)
+def test_a_formula_in_one_line(simple, language):
+    problem, _ = simple
+    formula = cheapest(problem, 0.01)
+    wanted = ONE_LINE[language].format(*map(str, np.float32(formula.numerator)))
+    assert LANGUAGES[language].one_line(formula, problem) == wanted
+
+
+@pytest.mark.parametrize("form", ["json", "table"])
+def test_the_table_shows_the_language(simple, form):
+    problem, _ = simple
+    wanted = LANGUAGES["hlsl"].one_line(cheapest(problem, 0.01), problem)
+    words = ["--from", "blinn-phong", "--to", "ggx", "--metric", "energy", "--lang", "hlsl"]
+    status, out, _ = run("formula", *words, "--all", "--format", form)
     assert status == 0
-    assert out.startswith("operations,worst_error,formula\n")
-    assert len(out.splitlines()) > 5
+    assert wanted in out
 
 
 @pytest.mark.parametrize(
@@ -328,6 +398,10 @@ def test_command():
         (["--range", "1"], "--range is LO:HI"),
         (["--range", "5:5"], "the range 5:5 is empty"),
         (["--range=-1:5"], "blinn-phong N = -1"),
+        # In single precision the range ends in 0 or infinity, or is a point.
+        (["--range", "1e-50:5"], "blinn-phong N = 0 is outside the legal range"),
+        (["--range", "5:1e40"], "blinn-phong N = inf is not a finite number"),
+        (["--range", "5:5.00000001"], "the range 5:5 is empty"),
         (["--tolerance", "0"], "a tolerance is positive"),
         (["--tolerance", "1e-12"], "the most accurate reaches"),
         (["--to", "blinn-phong"], "a formula needs two distributions"),

@@ -15,8 +15,7 @@ from numpy.polynomial import chebyshev
 
 import mdfconv
 from mdfconv.conversion import fast
-from mdfconv.conversion.equivalence import exact_route
-from mdfconv.conversion.remaining_error import remaining_error
+from mdfconv.conversion.equivalence import exact_route, to_root
 from mdfconv.distributions import one_parameter_distributions
 from mdfconv.fitting.fit import fit
 from mdfconv.fitting.metrics import list_metrics, metric_named
@@ -159,15 +158,6 @@ def pieces(pair, low, high, depth=0):
     yield from pieces(pair, middle, high, depth + 1)
 
 
-def errors_of(pair, end):
-    """Return RMSE and maximum error of the fit at the places where they are stored."""
-    x = end * fast.ERROR_SHARES
-    # The end itself may be uniform.
-    x[-1] *= 1 - 1e-9
-    given = pair.parameter(x)
-    return np.stack(remaining_error(pair.source, given, pair.target, pair.answer(x), pair.metric))
-
-
 def make(key):
     """Return one map and what there is to say of it."""
     name, source, target = key.split()
@@ -182,10 +172,18 @@ def make(key):
     last = 1.0 if pair.factored and source == "ggx" else end
     edges = np.array([low for low, *_ in found] + [last])
     powers = tuple(power for _, _, power, _ in found)
-    entry = fast.Map(edges, powers, errors_of(pair, last), pair.factored)
+    entry = fast.Map(edges, powers, pair.factored)
     worst = max(piece[-1] for piece in found)
     sizes = [power.size for _, _, power, _ in found]
     return key, entry, f"to x = {end:.6f}, worst {worst:.1e}, terms {sizes}"
+
+
+def needs_map(metric_name, source, target):
+    """Return whether a pair converts neither exactly nor by a constant."""
+    if exact_route(source, target) is not None:
+        return False
+    roots = [to_root(end, same_lobe=True)[0] for end in (source, target)]
+    return metric_named(metric_name).ratio(*roots) is None
 
 
 def main(path=FILE):
@@ -194,7 +192,7 @@ def main(path=FILE):
         f"{name} {source} {target}"
         for name in list_metrics()
         for source, target in itertools.product(SOURCES, TARGETS)
-        if exact_route(mdfconv.distribution(source), mdfconv.distribution(target)) is None
+        if needs_map(name, mdfconv.distribution(source), mdfconv.distribution(target))
     ]
     maps = {}
     with ProcessPoolExecutor() as pool:

@@ -94,6 +94,7 @@ class Root(Energy):
     name = "root"
     keeps = "square root of the light"
     word = "root"
+    purpose = "in between"
     quantity = "√(normalized D / max D of the reference)"
 
     def encode(self, value):

@@ -11,7 +11,7 @@ PACKAGE = Path(mdfconv.__file__).parent
 # From the roof to the ground; a module imports from its own floor and those beneath.
 FLOORS = (
     "cli", "reports", "benchmark", "render", "paper", "scene", "formula", "measured", "conversion",
-    "brdf", "fitting", "output", "distributions", "registry", "errors",
+    "brdf", "fitting", "light", "output", "distributions", "registry", "errors",
 )  # fmt: skip
 # What speaks to a terminal stands on the roof, alone.
 TERMINAL = {"typer", "rich", "click"}
@@ -31,6 +31,7 @@ ABOUT_PARTICULAR_ONES = {
     "reports/lights_page.py": "the pair that was rendered, and laws of particular pairs",
     "cli/furnace_command.py": "the names of BRDFs",
     "cli/compare_command.py": "the names of BRDFs",
+    "scene/light.py": "what lights are described by",
     "scene/shininess.py": "the definition of Wavefront's Ns and Pr",
     "benchmark/methods.py": "the paper's sweep",
     "cli/bench_command.py": "the pair that is measured by default",

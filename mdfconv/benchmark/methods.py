@@ -47,8 +47,8 @@ class MethodSpeed:
     parameter_error, parameter_error_max : float
         Median and maximum over the sweep of |p/p_fit − 1|, p_fit the result of ``"fit"``.
     rmse, rmse_max : float
-        Median and maximum over the sweep of the error that the conversion leaves: root mean
-        square under the metric, relative to the source's peak, on β from 0 to 4.8 β_half.
+        Median and maximum over the sweep of the error that the conversion leaves under the
+        metric: the relative root mean square of `remaining_error`.
     answered : float
         Share of the sweep for which there is a result in the legal range.
     """
@@ -75,11 +75,7 @@ class MethodSpeed:
 
 def covering(source: Distribution, target: Distribution, metric: Metric) -> list[Method]:
     """Return the methods that answer for a pair under a metric."""
-    return [
-        method
-        for method in list_methods()
-        if method.route(source, target) is not None and method.covers_metric(metric)
-    ]
+    return [method for method in list_methods() if method.covers(source, target, metric)]
 
 
 def answers(

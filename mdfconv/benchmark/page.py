@@ -17,12 +17,12 @@ TITLES = {
 _LEGENDS = {
     "substitutes": "ns: time to evaluate the unit form at one angle, from β. operations: "
     "arithmetic from cos β with the constants precomputed, a transcendental function counting "
-    "10. RMSE and max error: of the best fit to the unit form, relative to its peak, on β from 0 "
-    "to 4.8 β_half. energy error: of the best fit to the normalized form, "
-    "√(∫ (D − D_ref)² cos β dω / ∫ D_ref² cos β dω).",
+    "10. RMSE and max error: of the best fit to the unit form, √(∫ ΔD̄² dβ / ∫ D̄_ref² dβ) and "
+    "max |ΔD̄|. energy error: of the best fit to the normalized form, "
+    "√(∫ ΔD² cos β dω / ∫ D_ref² cos β dω).",
     "methods": "Over lobes as wide as those of the paper's sweep. "
     "parameter error: |p/p_fit − 1|, median and maximum, against the best fit under the metric. "
-    "RMSE: what the conversion leaves, under the metric and relative to the source's peak. "
+    "RMSE: what the conversion leaves under the metric, relative to the source's signal. "
     "curve_fit: scipy.optimize.curve_fit called once a value, on the samples and weights that fit "
     "uses, from equal half angles.",
     "kernels": "ns: time to evaluate the unit form at one angle. textbook: the printed "

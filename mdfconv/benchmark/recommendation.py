@@ -42,8 +42,7 @@ class Candidate:
     operations : int
         `Distribution.operations`.
     rmse, max_error : float
-        Root mean square and maximum of the error under the metric, relative to the source's
-        peak, on β from 0 to 4.8 β_half of the source.
+        The error under the metric, as in `remaining_error`.
     """
 
     distribution: str
@@ -113,7 +112,7 @@ def recommend(
     metric : Metric
         Under which errors are taken.
     tolerance : float
-        The largest error allowed, a share of the source's peak.
+        The largest `max_error` allowed.
 
     Raises
     ------

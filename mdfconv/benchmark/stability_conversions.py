@@ -28,6 +28,7 @@ _FIT_METRICS = ("unit", "energy")
 # that they go through.
 _INVERTIBLE = {"half-angle": ("cosine", "from_cosine"), "peak": ("peak_alpha", "from_peak_alpha")}
 _ENCODED = {"mirror-smooth": ("1e-08", "1e-06", "1e-04"), "rough": ("0.25", "0.5", "1")}
+_ENCODED_EXPONENTS = {"mirror-smooth": ("1000", "10000", "60000"), "rough": ("4", "10", "100")}
 
 # Columns of conversions.csv that are not a target's.
 _KEYS = ("method", "source", "regime", "gamma", "value")
@@ -166,7 +167,7 @@ def _fits(method: Method, source: Distribution, rows: _Rows) -> Iterator[Finding
         members = list(group)
         target = distribution(name)
         for metric in map(metric_named, _FIT_METRICS):
-            if method.route(source, target) is None or not method.covers_metric(metric):
+            if not method.covers(source, target, metric):
                 continue
             exact = [Decimal(row[metric.name]) for row in members]
             batch = _Batch(source, target, regime, [row["value"] for row in members], exact)
@@ -182,7 +183,8 @@ def _encodings(source: Distribution) -> Iterator[Finding]:
     tallies = Tallies()
     for encoding in source.encodings:
         label = f"{source.name}:{encoding.name}"
-        for regime, texts in _ENCODED.items():
+        smooth = source.parameter.larger_is_smoother
+        for regime, texts in (_ENCODED_EXPONENTS if smooth else _ENCODED).items():
             for dtype in _DTYPES:
                 values = np.array(texts, dtype=dtype)
                 tallies.of(source.name, f"{encoding.name} and back", regime, dtype).add(

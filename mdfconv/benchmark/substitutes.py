@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.benchmark.samples import hemisphere
 from mdfconv.benchmark.timing import Advance, Sizes, Spread, interleave, spread
 from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions import Distribution
@@ -36,11 +35,9 @@ class Substitute:
     parameter : float
         The best fit under the unit metric; NaN where there is none.
     rmse, max_error : float
-        What that fit leaves of the unit form: root mean square and maximum, on β from 0 to
-        4.8 β_half of the reference.
+        The error of the unit form that fit leaves, as in `remaining_error`.
     energy_error : float
-        √(∫ (D − D_ref)² cos β dω / ∫ D_ref² cos β dω) of normalized forms over the hemisphere,
-        for the best fit under the energy metric.
+        √(∫ (D − D_ref)² cos β dω / ∫ D_ref² cos β dω), for the best fit under the energy metric.
     ns : dict
         From "float64" and "float32" to nanoseconds an evaluation of the unit form from β.
     """
@@ -190,17 +187,5 @@ def best(
 
 def _fit_and_errors(source: Distribution, parameter: Array, target: Distribution) -> Array:
     """Return parameter, RMSE, maximum and energy error, shape (4, n)."""
-    columns = best(source, parameter, target, metric_named("unit"))
-    return np.stack([*columns, _energy_error(source, parameter, target)])
-
-
-def _energy_error(source: Distribution, parameter: Array, target: Distribution) -> Array:
-    metric = metric_named("energy")
-    result, *_ = best(source, parameter, target, metric)
-    beta, weight, wanted, peak = hemisphere(source, parameter, metric)
-    got = metric.signal(target, beta, result[:, None], peak)
-    share: Array = np.sqrt(
-        np.sum(weight * np.square(got - wanted), axis=1)
-        / np.sum(weight * np.square(wanted), axis=1)
-    )
-    return share
+    _, energy_error, _ = best(source, parameter, target, metric_named("energy"))
+    return np.stack([*best(source, parameter, target, metric_named("unit")), energy_error])

@@ -24,6 +24,7 @@ _COMMANDS = (
     "formula",
     "mtl",
     "texture",
+    "light",
     "list",
     "fit",
     "fit-table",

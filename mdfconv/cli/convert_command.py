@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -16,10 +17,10 @@ from mdfconv.cli.options import (
     FromOption,
     GammaOption,
     MethodOption,
-    MetricOption,
+    OptionalMetricOption,
     ToOption,
+    asked_metric,
     chosen_gamma,
-    chosen_metric,
     every_metric,
 )
 from mdfconv.cli.tables import (
@@ -31,20 +32,16 @@ from mdfconv.cli.tables import (
     tell,
     value_text,
 )
-from mdfconv.conversion import Conversion, explain, list_methods, method_named
+from mdfconv.conversion import Conversion, explain, list_methods
 from mdfconv.conversion.arrays import Gamma
 from mdfconv.conversion.endpoint import endpoint
 from mdfconv.distributions import list_distributions, one_parameter_distributions
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.metrics import Metric, list_metrics
+from mdfconv.fitting.metrics import Metric, metric_named
 
 # With more values than this, the table leaves out what the other methods would give.
 _VALUES_WITH_ALTERNATIVES = 10
 _EVERY = "all"
-_FOOTNOTE = (
-    "[dim]Errors: root mean square and maximum, relative to the source's peak (environment: "
-    "to all facets), on β from 0 to 4.8 β_half; of the unit forms, or in the metric of a fit.[/dim]"
-)
 
 
 def command(
@@ -59,16 +56,17 @@ def command(
     source: FromOption,
     target: ToOption,
     method: MethodOption = None,
-    metric: MetricOption = "unit",
+    metric: OptionalMetricOption = None,
     exposure: ExposureOption = None,
     gamma: GammaOption = None,
     format_: FormatOption = None,
 ) -> None:
     """Convert parameters from one distribution to another.
 
-    Prints the bare numbers in a pipe, a table with errors and alternatives on a terminal. Without
-    --method it is the closed form, or the fit of a pair that has none; --to all is every
-    distribution. With --gamma free both parameters of the target are fitted and printed.
+    Prints the bare numbers in a pipe, a table with errors and alternatives on a terminal. With
+    --metric it is the fit under that metric, without either the paper's closed form, or the fit of
+    a pair that has none; --to all is every distribution. With --gamma free both parameters of the
+    target are fitted and printed.
 
     Examples:
 
@@ -76,7 +74,7 @@ def command(
 
     mdfconv convert --from blinn-phong --to ggx:roughness 10 100 1000
 
-    mdfconv convert --from beckmann --to ggx --method fit --metric energy 0.2
+    mdfconv convert --from beckmann --to ggx --metric environment 0.2
 
     mdfconv convert --from beckmann --to gtr --gamma free --metric energy 0.2
 
@@ -88,13 +86,12 @@ def command(
     """
     numbers = _read(values)
     form = form_of(format_, in_pipe=Format.plain)
-    rule = _Rule(method, chosen_metric(metric, exposure), exposure, chosen_gamma(gamma))
+    rule = _Rule(method, asked_metric(metric, exposure), exposure, chosen_gamma(gamma))
     every = target.strip().lower() == _EVERY
     targets = _targets(numbers, source) if every else [target]
     conversions, refusals = _convert(numbers, source, targets, rule, errors=form != Format.plain)
     if refusals and (not every or not conversions):
         raise refusals[0]
-    _tell_metric(conversions, rule)
     for refusal in refusals:
         tell(f"left out: {refusal}")
     if form is Format.plain:
@@ -112,7 +109,7 @@ class _Rule:
     """How to convert: the options of the command that all targets share."""
 
     method: str | None
-    metric: Metric
+    metric: Metric | None
     exposure: float | None
     gamma: Gamma
 
@@ -121,17 +118,16 @@ class _Rule:
         return explain(values, source, target, self.method, **options)
 
     def others(self, chosen: Conversion) -> Iterator[_Rule]:
-        """Yield the other methods, the fit under every metric; fast is the fit again."""
+        """Yield the other methods under the metric of an answer."""
         for method in list_methods():
-            if method.name == "fast" or (self.gamma == "free" and method.name != "fit"):
-                continue
-            if not method.follows_metric:
-                if method.name != chosen.method:
-                    yield replace(self, method=method.name)
-                continue
-            for metric in every_metric(self.exposure):
-                if (method.name, str(metric)) != (chosen.method, chosen.metric):
-                    yield replace(self, method=method.name, metric=metric)
+            if method.name != chosen.method and (self.gamma != "free" or method.name == "fit"):
+                yield replace(self, method=method.name, metric=metric_named(chosen.metric))
+
+    def under_other_metrics(self, chosen: Conversion) -> Iterator[_Rule]:
+        """Yield the fits under the other metrics."""
+        for metric in every_metric(self.exposure):
+            if str(metric) != chosen.metric:
+                yield replace(self, method=None, metric=metric)
 
 
 def _read(values: list[str]) -> list[Any]:
@@ -206,17 +202,6 @@ def _takes_gamma(source: str, target: str, rule: _Rule) -> bool:
     return any(endpoint(name).distribution.second_parameter for name in names)
 
 
-def _tell_metric(conversions: list[list[Conversion]], rule: _Rule) -> None:
-    """Say that a metric that was asked for does not decide the answer."""
-    methods = dict.fromkeys(conversion.method for group in conversions for conversion in group)
-    for method in methods:
-        if rule.metric.name != list_metrics()[0] and not method_named(method).follows_metric:
-            tell(
-                f"note: the metric is that of the errors; {method} does not depend on it, "
-                "--method fit and --method fast do"
-            )
-
-
 def _write_plain(conversions: list[list[Conversion]], *, named: bool, free: bool) -> None:
     """Write the bare results, behind their names where there are several targets."""
     every = [conversion for group in conversions for conversion in group]
@@ -233,65 +218,84 @@ def _write_plain(conversions: list[list[Conversion]], *, named: bool, free: bool
 
 
 def _write_tables(conversions: list[list[Conversion]], rule: _Rule) -> None:
-    """Write a table a target: the chosen answer, and what the other methods would give."""
+    """Write tables a target: the methods under the metric, and the fits under the others."""
     out = console()
     for group in conversions:
-        print_table(_table(group, rule))
+        print_table(_methods_table(group, rule))
         for caution in dict.fromkeys(text for conversion in group for text in conversion.cautions):
             out.print(f"Note: {caution}.")
-    out.print(_FOOTNOTE)
+        inexact = [conversion for conversion in group if not conversion.exact]
+        if not inexact:
+            out.print("Exact: the same form.")
+            continue
+        metric = metric_named(inexact[0].metric)
+        out.print(
+            f"[dim]Errors under {metric} ({metric.purpose}): root mean square and maximum, "
+            "relative to the source's.[/dim]"
+        )
+        if len(inexact) <= _VALUES_WITH_ALTERNATIVES:
+            print_table(_metrics_table(inexact, rule))
 
 
-def _table(group: list[Conversion], rule: _Rule) -> Any:
-    ends = [endpoint(name) for name in (group[0].source, group[0].target)]
-    headings = [f"{end.label} {end.stored.symbol}" for end in ends]
+def _headings(conversion: Conversion) -> list[str]:
+    ends = [endpoint(name) for name in (conversion.source, conversion.target)]
     second = ends[1].distribution.second_parameter
-    symbol = second.symbol if second else None
-    numbers = [*headings, *([symbol] if symbol else []), "RMSE", "max error"]
-    columns = [*numbers[:-2], "method", *numbers[-2:], "keeps"]
+    return [f"{end.label} {end.stored.symbol}" for end in ends] + (
+        [second.symbol] if second else []
+    )
+
+
+def _methods_table(group: list[Conversion], rule: _Rule) -> Any:
+    headings = _headings(group[0])
+    columns = [*headings, "method", "RMSE", "max error"]
     rows, styles = [], []
     for conversion in group:
-        rows.append(_row(conversion, headings, symbol))
+        rows.append(_row(conversion, headings))
         styles.append("bold")
-        if len(group) <= _VALUES_WITH_ALTERNATIVES:
-            rows += _alternatives(conversion, rule, headings, symbol)
+        if len(group) <= _VALUES_WITH_ALTERNATIVES and not conversion.exact:
+            others = _answers(conversion, rule.others(conversion))
+            rows += [_row(other, headings, first=False) for other in others]
             styles += ["dim"] * (len(rows) - len(styles))
-    return rich_table(columns, rows, " → ".join(headings), styles, right=numbers)
+    title = f"{' → '.join(headings[:2])}, {group[0].metric}"
+    return rich_table(columns, rows, title, styles, right=[*headings, "RMSE", "max error"])
 
 
-def _row(
-    conversion: Conversion, headings: list[str], symbol: str | None, *, first: bool = True
-) -> dict[str, str]:
-    follows = method_named(conversion.method).follows_metric
-    numbers = [value_text(conversion.value) if first else "", value_text(conversion.result)]
-    row = dict(zip(headings, numbers, strict=True))
-    if symbol:
-        row[symbol] = "" if conversion.gamma is None else value_text(conversion.gamma)
-    return row | {
-        "method": f"{conversion.method} {conversion.metric}" if follows else conversion.method,
-        "RMSE": f"{conversion.rmse:.3g}",
-        "max error": f"{conversion.max_error:.3g}",
-        "keeps": conversion.notes[0] if conversion.exact else conversion.keeps,
+def _metrics_table(group: list[Conversion], rule: _Rule) -> Any:
+    headings = _headings(group[0])
+    rows = []
+    for conversion in group:
+        others = _answers(conversion, rule.under_other_metrics(conversion))
+        for number, other in enumerate(others):
+            metric = metric_named(other.metric)
+            row = _row(other, headings, first=number == 0)
+            rows.append(row | {"fit under": str(metric), "for": metric.purpose})
+    columns = [*headings, "fit under", "for"]
+    return rich_table(columns, rows, "Fits under the other metrics", right=headings)
+
+
+def _row(conversion: Conversion, headings: list[str], *, first: bool = True) -> dict[str, str]:
+    numbers = [_digits(conversion.value) if first else "", _digits(conversion.result)]
+    if len(headings) > 2:
+        numbers.append("" if conversion.gamma is None else _digits(conversion.gamma))
+    return dict(zip(headings, numbers, strict=True)) | {
+        "method": conversion.method,
+        "RMSE": _digits(conversion.rmse),
+        "max error": _digits(conversion.max_error),
     }
 
 
-def _alternatives(
-    conversion: Conversion, rule: _Rule, headings: list[str], symbol: str | None
-) -> list[dict[str, str]]:
-    """Return the rows of the methods that were not chosen, with their reason if none."""
-    rows: list[dict[str, str]] = []
-    for other in rule.others(conversion):
-        try:
-            (alternative,) = other.explain(
+def _digits(value: float | tuple[float, ...]) -> str:
+    """Return a number, or a pair with a comma, in six significant digits."""
+    return ",".join(f"{number:.6g}" for number in (value if isinstance(value, tuple) else (value,)))
+
+
+def _answers(conversion: Conversion, rules: Iterator[_Rule]) -> Iterator[Conversion]:
+    """Yield what other rules make of a value; nothing for one that has no answer."""
+    for rule in rules:
+        with suppress(MdfconvError):
+            yield from rule.explain(
                 conversion.value, conversion.source, conversion.target, errors=True
             )
-        except MdfconvError as error:
-            row = dict.fromkeys([*headings, symbol or headings[0], "RMSE", "max error"], "")
-            row |= {headings[1]: "—", "method": other.method or "", "keeps": error.reason}
-            rows.append(row)
-        else:
-            rows.append(_row(alternative, headings, symbol, first=False))
-    return rows
 
 
 def _record(conversion: Conversion) -> dict[str, Any]:

@@ -41,7 +41,7 @@ def command(
             "0.1:0.9, exponents 1:10000.",
         ),
     ] = None,
-    metric: MetricOption = "unit",
+    metric: MetricOption = "environment",
     exposure: ExposureOption = None,
     gamma: FixedGammaOption = None,
     language: Annotated[

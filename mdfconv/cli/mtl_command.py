@@ -47,7 +47,7 @@ def command(
             metavar="WHAT", help="roughness (Pr from Ns) or shininess (Ns from Pr, the inverse)."
         ),
     ] = "roughness",
-    metric: MetricOption = "energy",
+    metric: MetricOption = "environment",
     exposure: ExposureOption = None,
     replace: Annotated[
         bool, typer.Option("--replace", help="Drop the statement that was converted.")

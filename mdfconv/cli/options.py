@@ -53,7 +53,8 @@ FromOption = Annotated[
         metavar="MDF",
         autocompletion=_distributions,
         help="Distribution that the values belong to, such as beckmann, ggx or blinn-phong; "
-        "ggx:roughness and ggx:glossiness name stored forms of α.",
+        "ggx:roughness and ggx:glossiness name stored forms of α, blinn-phong:reflected the older "
+        "Phong exponent.",
     ),
 ]
 ToOption = Annotated[
@@ -81,20 +82,20 @@ MethodOption = Annotated[
         metavar="METHOD",
         autocompletion=_methods,
         help="closed-form (keeps the lobe's shape, approximately), half-angle, ward, peak, "
-        "fit: exact, under the metric, or fast: the same from stored polynomials.",
+        "fit: exact, under the metric, or fast: the same from stored polynomials. With --metric "
+        "alone the fit, by fast where that reaches.",
     ),
 ]
-MetricOption = Annotated[
-    str,
-    typer.Option(
-        "--metric",
-        metavar="METRIC",
-        autocompletion=_metrics,
-        help="What a fit keeps, and what errors are taken of: unit (the shape of the lobe), energy "
-        "(the light of the sun or a lamp), environment (the light of a natural environment) or "
-        "display (the picture on a screen).",
-    ),
-]
+_METRIC = typer.Option(
+    "--metric",
+    metavar="METRIC",
+    autocompletion=_metrics,
+    help="What a fit keeps, and what errors are taken of: unit (the shape of the lobe), energy "
+    "(the light of the sun or a lamp), environment (the light of a natural environment), "
+    "light:FILE (that of an environment map) or display (the picture on a screen).",
+)
+MetricOption = Annotated[str, _METRIC]
+OptionalMetricOption = Annotated[str | None, _METRIC]
 ExposureOption = Annotated[
     float | None,
     typer.Option(
@@ -159,6 +160,15 @@ def chosen_metric(name: str, exposure: float | None = None) -> Metric:
     if ":" in name:
         raise MdfconvError(f"the exposure is given twice, by --metric {name} and by --exposure")
     return metric_named(f"{name}:{exposure!r}")
+
+
+def asked_metric(name: str | None, exposure: float | None) -> Metric | None:
+    """Return the metric for the two options, None if neither is given; raise as the former."""
+    from mdfconv.fitting.metrics import list_metrics
+
+    if name is None and exposure is None:
+        return None
+    return chosen_metric(name or list_metrics()[0], exposure)
 
 
 def every_metric(exposure: float | None = None) -> list[Metric]:

@@ -15,8 +15,8 @@ from mdfconv.cli.options import (
     FormatOption,
     MdfOption,
     MethodOption,
-    MetricOption,
-    chosen_metric,
+    OptionalMetricOption,
+    asked_metric,
 )
 from mdfconv.cli.outputs import check_folder, write_named
 from mdfconv.cli.tables import write_table
@@ -38,7 +38,7 @@ def command(
         typer.Option("--m-b", metavar="M", help="Beckmann's m_B; repeatable; default the paper's."),
     ] = None,
     method: MethodOption = None,
-    metric: MetricOption = "unit",
+    metric: OptionalMetricOption = None,
     exposure: ExposureOption = None,
     reference: Annotated[
         str, typer.Option(metavar="MDF", help="Distribution that the errors are taken against.")
@@ -66,9 +66,9 @@ def command(
 
     mdfconv plot-error --m-b 0.2 --reference ggx --mdf beckmann --no-csv --output /tmp
     """
-    kept = chosen_metric(metric, exposure)
+    asked = asked_metric(metric, exposure)
     folder = check_folder(output)
-    figures = _curves(m_b, method, kept, reference, mdf, points)
+    figures = _curves(m_b, method, asked, reference, mdf, points)
     contents: dict[Path, bytes] = {}
     rows: list[dict[str, Any]] = []
     for name, drawn in figures.items():
@@ -83,11 +83,12 @@ def command(
 def _curves(
     m_b: list[float] | None,
     method: str | None,
-    metric: Metric,
+    metric: Metric | None,
     reference: str,
     mdf: list[str] | None,
     points: int,
 ) -> dict[str, Curves]:
+    from mdfconv.conversion.arrays import given_metric
     from mdfconv.paper.error_curves import DRAWN, PAPER_SETS, curves, parameters_for
 
     chief = one_parameter_distribution(reference).name
@@ -112,7 +113,8 @@ def _curves(
         }
     if any(set(parameters) == {chief} for parameters in sets.values()):
         raise MdfconvError(f"{chief} is the reference: name another --mdf to compare with it")
-    return {name: curves(parameters, chief, metric, points) for name, parameters in sets.items()}
+    shown = given_metric(metric)
+    return {name: curves(parameters, chief, shown, points) for name, parameters in sets.items()}
 
 
 def _files(

@@ -31,9 +31,8 @@ if TYPE_CHECKING:
     from mdfconv.benchmark.recommendation import Recommendation
 
 _FOOTNOTE = (
-    "[dim]Errors: root mean square and maximum under the metric, relative to the source's peak "
-    "(environment: to all facets), on β from 0 to 4.8 β_half. ns: one evaluation in float32, "
-    "now.[/dim]"
+    "[dim]Errors: root mean square and maximum under the metric, relative to the source's. "
+    "ns: one evaluation in float32, now.[/dim]"
 )
 
 
@@ -44,10 +43,10 @@ def command(
         float,
         typer.Option(
             metavar="T",
-            help="Largest error allowed under the metric, as a share of the source's peak.",
+            help="Largest maximum error allowed under the metric, relative to the source's.",
         ),
     ] = 0.05,
-    metric: MetricOption = "unit",
+    metric: MetricOption = "environment",
     exposure: ExposureOption = None,
     gamma: FixedGammaOption = None,
     format_: FormatOption = None,

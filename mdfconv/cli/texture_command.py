@@ -55,8 +55,8 @@ def command(
             help="r, g, b, a or l (grey), in OpenEXR its name; needed if there are several.",
         ),
     ] = None,
-    method: MethodOption = "fast",
-    metric: MetricOption = "unit",
+    method: MethodOption = None,
+    metric: MetricOption = "environment",
     exposure: ExposureOption = None,
     gamma: FixedGammaOption = None,
     exponent_max: Annotated[
@@ -80,7 +80,8 @@ def command(
 ) -> None:
     """Convert a roughness texture, texel by texel.
 
-    Other channels, ICC profile and resolution are kept. Says on standard error how many texels
+    Keeps the light of a natural environment, unless --metric or --method says otherwise. Other
+    channels, ICC profile and resolution are kept. Says on standard error how many texels
     had no answer and took the nearest: a black texel of an exponent is the roughest surface, one
     of an alpha or a roughness a perfect mirror.
 
@@ -100,7 +101,7 @@ def command(
     rule = TextureRule(
         source,
         target,
-        method or "fast",
+        method,
         str(chosen_metric(metric, exposure)),
         exponent_max,
         log2_scale,
@@ -119,7 +120,8 @@ def command(
     )
     for note in report.notes():
         tell(f"note: {note}")
-    tell(f"wrote {output}")
+    keeps = f"keeps the {report.keeps}" if report.keeps else "the same lobes"
+    tell(f"wrote {output}: {report.target}, {keeps}")
     if png:
         from mdfconv.scene.texture_figure import draw_histograms
 

@@ -15,7 +15,7 @@ from mdfconv.conversion.refusals import check_covered, check_pair, unreachable
 from mdfconv.distributions.evaluation import Array, as_operand
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError, MdfconvWarning
-from mdfconv.fitting.metrics import Metric, metric_named
+from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 
 FREE: Literal["free"] = "free"
 Gamma: TypeAlias = float | Literal["free"] | None
@@ -27,7 +27,7 @@ def convert(
     target: str | Endpoint,
     method: str | None = None,
     *,
-    metric: str | Metric = "unit",
+    metric: str | Metric | None = None,
     gamma: Gamma = None,
 ) -> Any:
     """Convert a parameter from one distribution to another.
@@ -42,12 +42,13 @@ def convert(
     method : str, optional
         ``"closed-form"``, ``"half-angle"``, ``"ward"``, ``"peak"``, ``"fit"`` or ``"fast"``,
         which is the fit within 1e-6 (display: 1e-4) at the price of a closed form. If not
-        given the closed form, or the fit of a pair that has none.
-    metric : str or Metric
-        What ``"fit"`` and ``"fast"`` keep: ``"unit"`` (the shape of the lobe), ``"energy"``
-        (the light of the sun or a lamp), ``"environment"`` (the light of a natural environment)
-        or ``"display"`` (the picture on a screen; ``"display:4"`` at exposure 4, 1 puts the
-        source's peak at white).
+        given the fit under the metric, by ``"fast"`` where that reaches; without a metric the
+        closed form of a pair that has one.
+    metric : str or Metric, optional
+        What the fit keeps: ``"unit"`` (the shape of the lobe; also if not given), ``"energy"``
+        (the light of the sun or a lamp), ``"environment"`` (the light of a natural environment),
+        ``"light:FILE"`` (that of an environment map) or ``"display"`` (the picture on a screen;
+        ``"display:4"`` at exposure 4, 1 puts the source's peak at white).
     gamma : float or "free", optional
         The second parameter, on either side that has one; its default if not given. ``"free"``
         fits that of the target along with the first.
@@ -78,8 +79,8 @@ def convert(
     array([0.1794, 0.0577])
     """
     ends = endpoints(source, target, given_gamma(gamma))
-    rule = chosen_method(method, *ends, gamma)
-    kept = metric_named(metric)
+    kept = given_metric(metric)
+    rule = chosen_method(method, *ends, gamma, metric_given=metric is not None)
     if not isinstance(values, tuple):
         operand = as_operand(values)
         if isinstance(gamma, str):
@@ -104,7 +105,14 @@ def given_gamma(gamma: Gamma) -> float | None:
     return None
 
 
-def chosen_method(name: str | None, source: Endpoint, target: Endpoint, gamma: Gamma) -> Method:
+def given_metric(metric: str | Metric | None) -> Metric:
+    """Return the metric that was asked for, or the first one."""
+    return metric_named(list_metrics()[0] if metric is None else metric)
+
+
+def chosen_method(
+    name: str | None, source: Endpoint, target: Endpoint, gamma: Gamma, *, metric_given: bool
+) -> Method:
     """Return the method that was asked for, or the one that a pair gets without a choice.
 
     Raises
@@ -114,7 +122,9 @@ def chosen_method(name: str | None, source: Endpoint, target: Endpoint, gamma: G
     """
     if not isinstance(gamma, str):
         pair = source.distribution, target.distribution
-        return default_method(*pair) if name is None else method_named(name)
+        if name is None:
+            return default_method(*pair, metric_given=metric_given)
+        return method_named(name)
     if target.distribution.second_parameter is None:
         raise MdfconvError(f"{target.distribution.name} has one parameter and no γ to fit")
     method = method_named("fit" if name is None else name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,10 +26,13 @@ class Endpoint:
         The distribution, with its γ if it has one.
     encoding : Encoding or None
         The stored form; None for the parameter itself.
+    caution : str
+        What to know of the name by which the user called it; "" for nothing.
     """
 
     distribution: Distribution
     encoding: Encoding | None = None
+    caution: str = field(default="", compare=False)
 
     @property
     def label(self) -> str:
@@ -88,7 +91,9 @@ def endpoint(name: str | Endpoint) -> Endpoint:
         raise MdfconvError(f"a distribution is named by a string, not {name!r}")
     head, colon, tail = name.partition(":")
     owner = distribution(head)
-    return Endpoint(owner, _encoding(owner, tail) if colon else None)
+    if colon:
+        return Endpoint(owner, _encoding(owner, tail))
+    return Endpoint(owner, caution=owner.ambiguous.get(head.strip().lower(), ""))
 
 
 def endpoints(
@@ -138,8 +143,10 @@ def _encoding(owner: Distribution, name: str) -> Encoding | None:
             f"{owner.name} has no encoding '{name}': its {owner.parameter.name} "
             f"{owner.parameter.symbol} is given as it is"
         )
-    if key == DEFAULT_ENCODING:
+    # Exponents are not an α.
+    plain = [] if owner.parameter.larger_is_smoother else [DEFAULT_ENCODING]
+    if key in plain:
         return None
     if key not in known:
-        raise unknown_name(f"encoding of {owner.name}", name, [DEFAULT_ENCODING, *known])
+        raise unknown_name(f"encoding of {owner.name}", name, [*plain, *known])
     return known[key]

@@ -8,7 +8,14 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from mdfconv.conversion.arrays import Gamma, apply, apply_free, chosen_method, given_gamma
+from mdfconv.conversion.arrays import (
+    Gamma,
+    apply,
+    apply_free,
+    chosen_method,
+    given_gamma,
+    given_metric,
+)
 from mdfconv.conversion.endpoint import Endpoint, endpoints
 from mdfconv.conversion.equivalence import exact_route
 from mdfconv.conversion.method import Method
@@ -16,7 +23,7 @@ from mdfconv.conversion.refusals import check_pair
 from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions.evaluation import Array, as_operand
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.metrics import Metric, metric_named
+from mdfconv.fitting.metrics import Metric
 
 Value: TypeAlias = float | tuple[float, float]
 
@@ -42,9 +49,9 @@ class Conversion:
     route : tuple of str
         The formulas or conditions applied, in order.
     rmse, max_error : float
-        Root mean square and maximum difference, in the metric and relative to the source's
-        peak, on β from 0 to 4.8 β_half of the source, at most π/2; for a pair those of the
-        worse axis.
+        √(∫ (S_t − S_s)² w dβ / ∫ S_s² w dβ) over the hemisphere, S the signal and w the weight
+        of the metric, which no conversion makes smaller than the fit under it; and
+        max |S_t − S_s| / max |S_s|. For a pair those of the worse axis.
     cautions : tuple of str
         What this value in particular calls for.
     """
@@ -68,7 +75,7 @@ class Conversion:
         """The cautions, what the method keeps, and the route, as sentences."""
         by = (f"by {', '.join(self.route)}",) if self.route else ()
         if self.exact:
-            return ("exact: the same form", *by)
+            return (*self.cautions, "exact: the same form", *by)
         return (*self.cautions, f"keeps the {self.keeps}", *by)
 
 
@@ -78,7 +85,7 @@ def explain(
     target: str | Endpoint,
     method: str | None = None,
     *,
-    metric: str | Metric = "unit",
+    metric: str | Metric | None = None,
     gamma: Gamma = None,
     errors: bool = True,
 ) -> list[Conversion]:
@@ -104,7 +111,8 @@ def explain(
         As `convert`.
     """
     ends = endpoints(source, target, given_gamma(gamma))
-    rule, kept = chosen_method(method, *ends, gamma), metric_named(metric)
+    kept = given_metric(metric)
+    rule = chosen_method(method, *ends, gamma, metric_given=metric is not None)
     axes = _axes(values, *ends)
     parameter = ends[0].decode([value for pair in axes for value in pair])
     table = _Table(rule, kept, parameter, *ends, free=isinstance(gamma, str), errors=errors)
@@ -170,21 +178,21 @@ class _Table:
             self._stored = target.encode(self._result)
             if pair[1].second_parameter:
                 self._gamma = np.full(parameter.shape, pair[1].gamma)
+        if self._exact or free:
+            self._answered_by = [method.name] * parameter.size
+        else:
+            self._answered_by = method.answered_by(parameter, *pair, metric)
         self._errors = (
             self._remaining(free=free) if errors else (np.full_like(parameter, np.nan),) * 2
         )
 
     def _remaining(self, *, free: bool) -> tuple[Array, Array]:
         """Return the RMSE and the maximum error, shapes (n,)."""
-        pair = self._source.distribution, self._target.distribution
-        if not self._exact and not free:
-            return self._method.remaining_error(
-                self._parameter, pair[0], self._result, pair[1], self._metric
-            )
+        if self._exact:
+            return np.zeros_like(self._parameter), np.zeros_like(self._parameter)
+        source, target = self._source.distribution, self._target.distribution
         gamma = self._gamma if free else None
-        return remaining_error(
-            pair[0], self._parameter, pair[1], self._result, self._metric, gamma=gamma
-        )
+        return remaining_error(source, self._parameter, target, self._result, self._metric, gamma)
 
     def conversion(self, pair: tuple[Any, ...], rows: slice) -> Conversion:
         """Return the conversion of one value."""
@@ -195,20 +203,23 @@ class _Table:
             value=_value([float(value) for value in pair]),
             result=_value(self._stored[rows].tolist()),
             gamma=None if self._gamma is None else float(self._gamma[rows][0]),
-            method=self._method.name,
+            method=self._answered_by[rows][0],
             metric=str(self._metric),
             exact=self._exact,
             keeps="" if self._exact else self._method.keeps(self._metric),
             route=self._route,
             rmse=rmse,
             max_error=max_error,
-            cautions=() if self._exact else self._cautions(rows),
+            cautions=self._cautions(rows),
         )
 
     def _cautions(self, rows: slice) -> tuple[str, ...]:
+        cautions = [end.caution for end in (self._source, self._target) if end.caution]
+        if self._exact:
+            return tuple(cautions)
         pair = self._source.distribution, self._target.distribution
         axes = zip(self._parameter[rows].tolist(), self._result[rows].tolist(), strict=True)
-        cautions = [text for axis in axes for text in self._method.cautions(*axis, *pair)]
+        cautions += [text for axis in axes for text in self._method.cautions(*axis, *pair)]
         if self._at_limit[rows].any():
             low, high = pair[1].parameters[1].fit_range
             cautions.append(

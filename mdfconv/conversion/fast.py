@@ -4,8 +4,7 @@ A lobe is described by x, which for a smooth surface is its roughness and stays 
 its concentration κ, about 1/x² and 0 for a uniform lobe (`MapVariables` of the distributions).
 For each pair and metric the product x² κ of the source's x and the fit's κ is a smooth function
 of x; where source and target become uniform together, x² κ/(1−x²) is. Both are stored as
-polynomials on a few pieces, made from the fit by ``python -m tests.generate_fast``, with the
-error that the fit leaves.
+polynomials on a few pieces, made from the fit by ``python -m tests.generate_fast``.
 """
 
 from __future__ import annotations
@@ -22,16 +21,12 @@ from mdfconv.conversion.method import Method
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.declarations import MapVariables
 from mdfconv.distributions.evaluation import Array
-from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
+from mdfconv.fitting.metrics.base import scaled
 
 DATA = "fast.npz"
-# Where the errors are stored, as shares of the largest x of a map: between lobes that become alike
-# as they become smooth they fall like a power of x.
-ERROR_SHARES = np.union1d(np.geomspace(1e-4, 1, 49), np.linspace(0, 1, 49)[1:])
 # So many values and their intermediates stay in the cache.
 _BLOCK = 8192
-# A logarithm is interpolated: an error below this is none.
-_NO_ERROR = 1e-30
 
 
 @dataclass(frozen=True)
@@ -44,15 +39,12 @@ class Map:
         Where the pieces begin and end in x; the first edge is 0.
     coefficients : tuple of numpy.ndarray
         For each piece those of a polynomial in z, which runs from −1 to 1, constant first.
-    errors : numpy.ndarray, shape (2, n)
-        RMSE and maximum error of the conversion at ERROR_SHARES.
     factored : bool
         Whether both lobes become uniform at x = 1, so that x² κ/(1−x²) is stored.
     """
 
     edges: Array
     coefficients: tuple[Array, ...]
-    errors: Array
     factored: bool
 
     def __call__(self, x: Array) -> Array:
@@ -89,7 +81,6 @@ def pack(maps: dict[str, Map]) -> dict[str, Array]:
         "terms": np.array([piece.size for piece in pieces]),
         "edges": np.concatenate([stored.edges for stored in every]),
         "coefficients": np.concatenate(pieces),
-        "errors": np.stack([stored.errors for stored in every]).astype(np.float32),
     }
 
 
@@ -102,16 +93,11 @@ def load() -> dict[str, Map]:
     pieces = content["pieces"]
     firsts = np.cumsum(pieces) - pieces
     edges = np.split(content["edges"], np.cumsum(pieces + 1)[:-1])
-    columns = (content["names"], edges, firsts, pieces, content["errors"], content["factored"])
+    columns = (content["names"], edges, firsts, pieces, content["factored"])
     return {
-        str(name): Map(edge, tuple(terms[first : first + count]), errors, bool(factored))
-        for name, edge, first, count, errors, factored in zip(*columns, strict=True)
+        str(name): Map(edge, tuple(terms[first : first + count]), bool(factored))
+        for name, edge, first, count, factored in zip(*columns, strict=True)
     }
-
-
-@cache
-def _stored_metrics() -> frozenset[str]:
-    return frozenset(name.split()[0] for name in load())
 
 
 @dataclass(frozen=True)
@@ -138,6 +124,12 @@ def _stored(source: Distribution, target: Distribution, metric: str) -> _Stored 
     return None
 
 
+def _ratio(source: Distribution, target: Distribution, metric: Metric) -> float | None:
+    """Return the constant by which the parameters of the lobes themselves convert, or None."""
+    roots = [to_root(end, same_lobe=True)[0] for end in (source, target)]
+    return metric.ratio(roots[0], roots[1])
+
+
 class Fast(Method):
     """The least-squares fit from stored polynomials: 1e-6 from it, 1e-4 for a display.
 
@@ -154,19 +146,26 @@ class Fast(Method):
         """Return what the metric keeps."""
         return metric.keeps
 
-    def covers_metric(self, metric: Metric) -> bool:
-        """Return whether there are maps: for the display metric at exposure 1 only."""
-        return str(metric) in _stored_metrics()
-
     def route(self, source: Distribution, target: Distribution) -> tuple[str, ...] | None:
-        """Return the one step; None for distributions without maps, such as GTR."""
-        stored = any(_stored(source, target, metric) for metric in _stored_metrics())
-        return ("stored least squares",) if stored else None
+        """Return the one step; None for pairs without maps, such as those of GTR."""
+        metrics = map(metric_named, list_metrics())
+        covered = any(self.covers(source, target, metric) for metric in metrics)
+        return ("stored least squares",) if covered else None
+
+    def covers(self, source: Distribution, target: Distribution, metric: Metric) -> bool:
+        """Return whether there is a map (for the display metric at exposure 1) or a constant."""
+        stored = _stored(source, target, str(metric)) is not None
+        return stored or _ratio(source, target, metric) is not None
 
     def convert(
         self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
     ) -> Array:
         """Evaluate the polynomials; NaN outside their range."""
+        ratio = _ratio(source, target, metric)
+        if ratio is not None:
+            first = follow(to_root(source, same_lobe=True)[1], parameter)
+            last = scaled(first, ratio, to_root(target, same_lobe=True)[0])
+            return follow(from_root(target, same_lobe=True), last)
         stored, back = self._for(source, target, metric)
         forward = to_root(source, same_lobe=True)[1]
         values = parameter.ravel()
@@ -177,26 +176,10 @@ class Fast(Method):
             answers[block] = follow(back, stored.target.from_map(x, stored.map(x)))
         return answers.reshape(parameter.shape)
 
-    def remaining_error(
-        self,
-        parameter: Array,
-        source: Distribution,
-        result: Array,
-        target: Distribution,
-        metric: Metric,
-    ) -> tuple[Array, Array]:
-        """Return RMSE and maximum error as stored with the polynomials."""
-        stored, _ = self._for(source, target, metric)
-        x = stored.source.width(follow(to_root(source, same_lobe=True)[1], parameter))
-        share = np.log(x / stored.map.edges[-1])
-        rmse, maximum = (
-            np.exp(np.interp(share, np.log(ERROR_SHARES), np.log(np.maximum(errors, _NO_ERROR))))
-            for errors in stored.map.errors
-        )
-        return rmse, maximum
-
     def range_text(self, source: Distribution, target: Distribution, metric: Metric) -> str:
         """Return which parameters of the source the stored maps cover."""
+        if _ratio(source, target, metric) is not None:
+            return ""
         stored, _ = self._for(source, target, metric)
         end = stored.source.from_width(np.asarray(stored.map.edges[-1]))
         end = follow(from_root(source, same_lobe=True), end)

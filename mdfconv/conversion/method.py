@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
@@ -39,28 +38,19 @@ class Method(ABC):
         computes nothing, NaN.
         """
 
-    def covers_metric(self, metric: Metric) -> bool:
-        """Return whether the method can answer under a metric."""
-        return True
+    def covers(self, source: Distribution, target: Distribution, metric: Metric) -> bool:
+        """Return whether the method can answer for a pair under a metric."""
+        return self.route(source, target) is not None
+
+    def answered_by(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> list[str]:
+        """Return the name of the method that answers each value, for a pair that is covered."""
+        return [self.name] * parameter.size
 
     def range_text(self, source: Distribution, target: Distribution, metric: Metric) -> str:
         """Return which parameters of the source a method with a range of its own covers."""
         return ""
-
-    def remaining_error(
-        self,
-        parameter: Array,
-        source: Distribution,
-        result: Array,
-        target: Distribution,
-        metric: Metric,
-    ) -> tuple[Array, Array]:
-        """Return the RMSE and the maximum error of conversions, shapes (n,).
-
-        Both are those of `mdfconv.conversion.remaining_error`, which a method may know without
-        computing them.
-        """
-        return remaining_error(source, parameter, target, result, metric)
 
     def cautions(
         self, parameter: float, result: float, source: Distribution, target: Distribution

@@ -25,9 +25,11 @@ def check_covered(method: Method, metric: Metric, source: Endpoint, target: Endp
             f"{method.name} has no conversion from {pair[0].label} to {pair[1].label}",
             f"use {' or '.join(others)}",
         )
-    if not method.covers_metric(metric):
+    if not method.covers(*pair, metric):
         raise MdfconvError(
-            f"{method.name} has no conversions stored under the {metric} metric", "use fit"
+            f"{method.name} has no conversion stored from {pair[0].label} to {pair[1].label} "
+            f"under the {metric} metric",
+            "use fit",
         )
 
 
@@ -84,8 +86,7 @@ def _answers(
     pair = source.distribution, target.distribution
     answers = []
     for method in list_methods():
-        covered = method.route(*pair) is not None and method.covers_metric(metric)
-        if method is refused or not covered:
+        if method.name == refused.name or not method.covers(*pair, metric):
             continue
         with np.errstate(all="ignore"):
             stored = target.encode(method.convert(np.asarray([value]), *pair, metric))

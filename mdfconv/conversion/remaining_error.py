@@ -1,4 +1,4 @@
-"""The error that a conversion leaves."""
+"""The error that a conversion leaves under a metric."""
 
 from __future__ import annotations
 
@@ -7,19 +7,10 @@ import numpy as np
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.problem import Problem, narrowest
 
-# The number of samples behind the paper's Table 2.
-SAMPLES = 3001
-# 4.8 β_half is 4 m_B for Beckmann, the paper's habit.
-_HALF_WIDTHS = 4.8
-# 256 × 3001 angles are 6 MB.
-_ROWS_AT_ONCE = 256
-
-
-def lobe_extent(distribution: Distribution, parameter: Array) -> Array:
-    """Return the angle up to which a lobe matters: 4.8 β_half, at most π/2, radians."""
-    extent = _HALF_WIDTHS * distribution.half_width(parameter)
-    return np.where(extent <= np.pi / 2, extent, np.pi / 2)
+# 64 × 800 angles and what is computed there stay in the cache.
+_ROWS_AT_ONCE = 64
 
 
 def remaining_error(
@@ -28,10 +19,9 @@ def remaining_error(
     target: Distribution,
     result: Array,
     metric: Metric,
-    extent: Array | None = None,
     gamma: Array | None = None,
 ) -> tuple[Array, Array]:
-    """Compare under a metric on β from 0 to 4.8 β_half of the source, at most π/2.
+    """Compare two lobes by what a metric minimizes, so that no conversion is better than the fit.
 
     Parameters
     ----------
@@ -40,48 +30,36 @@ def remaining_error(
     parameter, result : numpy.ndarray, shape (n,)
         Their parameters.
     metric : Metric
-        Its signal is compared: D̄, D over the source's maximum, or its encoding for a screen.
-    extent : numpy.ndarray, shape (n,), optional
-        The largest angles, radians, in place of those.
+        Its signals S are compared, with its weight w, over the whole hemisphere.
     gamma : numpy.ndarray, shape (n,), optional
         The second parameter of the target, if it differs from row to row.
 
     Returns
     -------
     rmse, max_error : numpy.ndarray, shape (n,)
-        Root mean square and maximum of the difference over 3001 uniform angles.
+        √(∫ (S_t − S_s)² w dβ / ∫ S_s² w dβ), and max |S_t − S_s| / max |S_s|.
     """
-    extent = lobe_extent(source, parameter) if extent is None else extent
-    columns = [
-        _compare(
-            source,
-            parameter[rows],
-            target if gamma is None else target.with_gamma(float(gamma[rows][0])),
-            result[rows],
-            extent[rows],
-            metric,
-        )
-        for rows in _blocks(parameter.size, _ROWS_AT_ONCE if gamma is None else 1)
-    ]
+    if gamma is not None:
+        columns = [
+            _compare(source, parameter[[row]], target.with_gamma(gamma[row]), result[[row]], metric)
+            for row in range(parameter.size)
+        ]
+    else:
+        columns = [
+            _compare(source, parameter[rows], target, result[rows], metric)
+            for rows in _blocks(parameter.size)
+        ]
     rmse, maximum = np.concatenate([np.zeros((2, 0)), *columns], axis=1)
     return rmse, maximum
 
 
 def _compare(
-    source: Distribution,
-    parameter: Array,
-    target: Distribution,
-    result: Array,
-    extent: Array,
-    metric: Metric,
+    source: Distribution, parameter: Array, target: Distribution, result: Array, metric: Metric
 ) -> Array:
-    beta = extent[:, None] * np.linspace(0, 1, SAMPLES)
-    peak = source.maximum(parameter[:, None], normalized=metric.normalized)
-    difference = metric.signal(target, beta, result[:, None], peak)
-    difference -= metric.signal(source, beta, parameter[:, None], peak)
-    rmse = np.sqrt(np.mean(np.square(difference), axis=1))
-    return np.stack([rmse, np.max(np.abs(difference), axis=1)])
+    quadrature = metric.quadrature(narrowest(source, parameter, target, result))
+    problem = Problem(source, parameter, target, metric, quadrature, np.arange(parameter.size))
+    return np.stack(problem.relative_error(result))
 
 
-def _blocks(size: int, rows: int) -> list[slice]:
-    return [slice(start, start + rows) for start in range(0, size, rows)]
+def _blocks(size: int) -> list[slice]:
+    return [slice(start, start + _ROWS_AT_ONCE) for start in range(0, size, _ROWS_AT_ONCE)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -49,6 +50,8 @@ class Distribution(ABC):
         The transcendental functions of NumPy that the kernel cannot avoid.
     anisotropic : bool
         Whether it takes a pair of parameters.
+    ambiguous : dict
+        From aliases that users mean different things by to a sentence that says what is taken.
     scales_with_slope : bool
         Whether the cumulative distribution is a function of tan β over the parameter.
     smith : bool
@@ -69,6 +72,7 @@ class Distribution(ABC):
     operations: ClassVar[int]
     functions: ClassVar[tuple[str, ...]] = ("tan",)
     encodings: ClassVar[tuple[Encoding, ...]] = ()
+    ambiguous: ClassVar[Mapping[str, str]] = {}
     map_variables: ClassVar[MapVariables | None] = None
     anisotropic: ClassVar[bool] = False
     scales_with_slope: ClassVar[bool] = False

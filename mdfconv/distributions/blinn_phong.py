@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from mdfconv.distributions.base import Distribution
 from mdfconv.distributions.declarations import MapVariables, Printed, same
 from mdfconv.distributions.evaluation import Array, negative_log_tail, tangent_square
-from mdfconv.distributions.parameter import Parameter
+from mdfconv.distributions.parameter import Encoding, Parameter
+
+# Phong's own exponent n, of the angle between the reflected ray and the viewer, which at normal
+# incidence is 2β: F = 1 − cos^(n+1) 2β. N = 4 n + 3 is what the fit that keeps the light of a
+# natural environment tends to as n grows (N = 43.05 for n = 10; N = 4 n + 2 has the same peak), and
+# leaves a relative error of 7 % at n = 1, 0.6 % at 10 and 0.04 % at 100.
+REFLECTED = Encoding(
+    "reflected",
+    Parameter("exponent", "n", (1.0, 2500.0), 0.0, lower_closed=True, larger_is_smoother=True),
+    lambda stored: 4 * stored + 3,
+    lambda exponent: (exponent - 3) / 4,
+    "N = 4 n + 3, of the reflected ray",
+)
 
 
 class BlinnPhong(Distribution):
@@ -23,10 +37,15 @@ class BlinnPhong(Distribution):
 
     name = "blinn-phong"
     aliases = ("phong", "blinn")
+    ambiguous: ClassVar = {
+        "phong": "phong is taken for Blinn's exponent, of the half vector; that of the reflected "
+        "ray, about a quarter, is blinn-phong:reflected"
+    }
     unit_formula = "cos^N β"
     normalized_formula = "(N+2)/(2π) cos^N β"
     source = "Phong 1975; Blinn 1977; Lewis 1994"
     parameters = (Parameter("exponent", "N", (1.0, 1e4), larger_is_smoother=True),)
+    encodings = (REFLECTED,)
     operations = 20
     functions = ("tan", "log1p", "exp")
     map_variables = MapVariables(

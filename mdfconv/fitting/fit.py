@@ -15,6 +15,7 @@ import numpy as np
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.metrics.base import scaled
 from mdfconv.fitting.problem import Problem
 from mdfconv.fitting.quadrature import Quadrature
 from mdfconv.fitting.refine import refine
@@ -80,7 +81,7 @@ def fit(
         if ratio is None:
             best[rows], distance[rows] = _minimum(problem)
         else:
-            best[rows] = np.minimum(parameter[rows] * ratio, limits.upper)
+            best[rows] = scaled(parameter[rows], ratio, target)
             distance[rows], _ = problem.distance(np.log(best[rows]), np.arange(rows.size))
     return Fit(best, distance, (best == limits.upper) & limits.upper_closed)
 

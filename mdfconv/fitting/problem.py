@@ -8,7 +8,7 @@ from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.fitting.level import level_crossing
 from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.quadrature import LobeQuadrature, Quadrature
+from mdfconv.fitting.quadrature import Quadrature
 
 # An encoding for a screen rises like a root where a distribution leaves 0: panels that shrink
 # by 4 towards the edge resolve it to 1e-6 of the lobe.
@@ -31,7 +31,7 @@ class Problem:
     metric : Metric
         What the distance measures.
     quadrature : Quadrature, optional
-        Where it is sampled; by default the whole hemisphere.
+        Where it is sampled; by default as the metric says, over the whole hemisphere.
     rows : numpy.ndarray of int, shape (m,)
         Which of the n problems make the batch.
 
@@ -53,11 +53,10 @@ class Problem:
         self.target, self.metric = target, metric
         self._source = source
         self._source_parameter = parameter[rows][:, None]
-        tangent = source.half_tangent(parameter[rows])
-        self.tangent = np.where(tangent < _WIDEST_TANGENT, tangent, _WIDEST_TANGENT)
+        self.tangent = _tangent(source, parameter[rows])
         self._peak = source.maximum(self._source_parameter, normalized=metric.normalized)
         if quadrature is None:
-            self._quadrature: Quadrature = LobeQuadrature(np.arctan(self.tangent))
+            self._quadrature: Quadrature = metric.quadrature(np.arctan(self.tangent))
             self._rows: Indices = np.arange(rows.size)
         else:
             self._quadrature, self._rows = quadrature, rows
@@ -89,16 +88,45 @@ class Problem:
 
     def distance(self, log_parameter: Array, index: Indices) -> tuple[Array, Array]:
         """Return the distance and half its slope in ln p, for some problems of the batch."""
-        parameter, peak = np.exp(log_parameter)[:, None], self._peak[index]
-        if self._samples is None:
-            breaks = [self._source_breaks[index], self._breaks(self.target, parameter, peak)]
-            beta, weight, signal = self._sampled(index, np.concatenate(breaks, axis=1))
-        else:
-            beta, weight, signal = (array[index] for array in self._samples)
-        value, slope = self.metric.signal_and_slope(self.target, beta, parameter, peak)
+        parameter = np.exp(log_parameter)[:, None]
+        beta, weight, signal = self._samples_for(parameter, index)
+        value, slope = self.metric.signal_and_slope(self.target, beta, parameter, self._peak[index])
         value -= signal
         weighted = weight * value
         return np.einsum("ij,ij->i", weighted, value), np.einsum("ij,ij->i", weighted, slope)
+
+    def relative_error(self, parameter: Array) -> tuple[Array, Array]:
+        """Return √(distance / distance of the source from 0), and max |ΔS| / max |S|.
+
+        Parameters
+        ----------
+        parameter : numpy.ndarray, shape (m,)
+            Those of the target.
+
+        Returns
+        -------
+        root_mean_square, maximum : numpy.ndarray, shape (m,)
+            Infinite where the source has no signal, as a uniform lobe has no contrast.
+        """
+        index = np.arange(self.size)
+        beta, weight, signal = self._samples_for(parameter[:, None], index)
+        difference = self.metric.signal(self.target, beta, parameter[:, None], self._peak)
+        difference -= signal
+        with np.errstate(divide="ignore"):
+            share = np.sqrt(
+                np.einsum("ij,ij,ij->i", weight, difference, difference)
+                / np.einsum("ij,ij,ij->i", weight, signal, signal)
+            )
+            largest = np.max(np.abs(difference), axis=1) / np.max(np.abs(signal), axis=1)
+        return share, largest
+
+    def _samples_for(self, parameter: Array, index: Indices) -> tuple[Array, Array, Array]:
+        """Return angles, weights and the source's signal for parameters of the target."""
+        if self._samples is not None:
+            beta, weight, signal = (array[index] for array in self._samples)
+            return beta, weight, signal
+        breaks = self._breaks(self.target, parameter, self._peak[index])
+        return self._sampled(index, np.concatenate([self._source_breaks[index], breaks], axis=1))
 
     def _sampled(self, index: Indices, breaks: Array) -> tuple[Array, Array, Array]:
         """Return angles, weights and the source's signal."""
@@ -120,3 +148,14 @@ class Problem:
                 ends.append((mode, np.zeros_like(mode)))
             breaks += [level_crossing(distribution, parameter, level, *end) for end in ends]
         return np.concatenate(breaks, axis=1)
+
+
+def narrowest(source: Distribution, parameter: Array, target: Distribution, result: Array) -> Array:
+    """Return β_half of the narrower lobe of each pair, radians, shape (n,)."""
+    tangents = _tangent(source, parameter), _tangent(target, result)
+    return np.arctan(np.minimum(*tangents))
+
+
+def _tangent(distribution: Distribution, parameter: Array) -> Array:
+    tangent = distribution.half_tangent(parameter)
+    return np.where(tangent < _WIDEST_TANGENT, tangent, _WIDEST_TANGENT)

@@ -95,6 +95,7 @@ FORMS: Sequence[Form] = (
     Form("blinn-phong", "ggx", "C = a/√(N+b)", lambda x, a, b: a / np.sqrt(x + b), (1.697, 4.5)),
 )  # fmt: skip
 
+_DECIMALS = 9
 _COLUMNS = {
     "beckmann": "m_b",
     "blinn-phong": "n",
@@ -128,7 +129,7 @@ def refit_rows(metrics: Sequence[Metric]) -> list[dict[str, Any]]:
             "printed": _coefficients(refitted.form.printed),
             "worst_printed": refitted.printed_error,
             "refitted": _coefficients(refitted.coefficients),
-            "worst_refitted": refitted.error,
+            "worst_refitted": round(refitted.error, _DECIMALS),
         }
         for metric in metrics
         for refitted in refit(metric)
@@ -136,7 +137,8 @@ def refit_rows(metrics: Sequence[Metric]) -> list[dict[str, Any]]:
 
 
 def _coefficients(values: Sequence[float]) -> str:
-    return " ".join(f"{value:.6g}" for value in values)
+    # Where a power has no part, what is left of its coefficient is rounding.
+    return " ".join(f"{round(value, _DECIMALS) + 0.0:.6g}" for value in values)
 
 
 def _refit_one(form: Form, metric: Metric, x: Array, y: Array) -> Refit:

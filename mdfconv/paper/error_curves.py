@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from mdfconv.conversion import convert
-from mdfconv.conversion.remaining_error import lobe_extent
-from mdfconv.distributions import distribution
+from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
@@ -29,6 +28,8 @@ PAPER_SETS: Mapping[str, Mapping[str, float]] = {
 }  # fmt: skip
 DRAWN = ("blinn-phong", "gauss", "ggx", "sawicki", "schlick")
 _MOST_POINTS = 1_000_000
+# 4.8 β_half is 4 m_B for Beckmann, the paper's habit.
+_HALF_WIDTHS = 4.8
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,14 @@ class Curves:
         return rows
 
 
+def lobe_extent(distribution: Distribution, parameter: Array) -> Array:
+    """Return the angle up to which the figures show a lobe: 4.8 β_half, at most π/2, radians."""
+    extent = _HALF_WIDTHS * distribution.half_width(parameter)
+    return np.where(extent <= np.pi / 2, extent, np.pi / 2)
+
+
 def parameters_for(
-    m_b: float, names: Sequence[str], method: str | None, metric: Metric
+    m_b: float, names: Sequence[str], method: str | None, metric: Metric | None
 ) -> dict[str, float]:
     """Return the parameters of distributions converted from Beckmann's m_B."""
     return {name: float(convert(m_b, "beckmann", name, method, metric=metric)) for name in names}
@@ -101,9 +108,16 @@ def curves(parameters: Mapping[str, float], reference: str, metric: Metric, poin
         Unit compares unit forms, as the paper; others what they compare in a fit.
     points : int
         Number of angles, from 0 to 4.8 β_half of the reference, at most π/2.
+
+    Raises
+    ------
+    MdfconvError
+        If the number of points is none, or the metric does not compare over β.
     """
     if not 2 <= points <= _MOST_POINTS:
         raise MdfconvError(f"the number of points is from 2 to {_MOST_POINTS}")
+    if not metric.over_angles:
+        raise MdfconvError(f"{metric} compares spectra: it has no curves over β")
     source, parameter = distribution(reference), np.array([parameters[reference]])
     beta = np.linspace(0, float(lobe_extent(source, parameter)[0]), points)
     peak = source.maximum(parameter, normalized=metric.normalized)

@@ -14,7 +14,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from mdfconv.conversion.remaining_error import SAMPLES, remaining_error
+from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions import distribution, one_parameter_distributions
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
@@ -22,8 +22,11 @@ from mdfconv.fitting.fit import fit
 from mdfconv.fitting.free_gamma import fit_free_gamma
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.metrics.unit import Unit
+from mdfconv.fitting.problem import Problem
 from mdfconv.fitting.quadrature import UniformSamples
 
+# Between 0 and the limit of a row.
+SAMPLES = 3001
 AGREEMENT = 4e-4  # relative
 _LIMIT = 4.0  # β up to 4 m_B, the paper's habit
 _BATCH = 64
@@ -121,8 +124,8 @@ def fit_table(
     limit : numpy.ndarray, shape (n,)
         The limit of β of each row, radians, for the unit metric.
     metric : Metric
-        Unit: the paper's protocol, on 3001 uniform angles. Others: the fit of
-        ``convert --method fit`` over the hemisphere, with the errors that it reports.
+        Unit: the paper's protocol, on 3001 uniform angles, and its RMSE. Others: the fit over
+        the hemisphere, with the relative root mean square of `remaining_error`.
     extended : bool
         Whether to add the distributions that the paper's table lacks, with γ of those that
         have one.
@@ -165,9 +168,13 @@ def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dic
     source, n_eq11 = distribution(_SOURCE), 2 / np.square(m_b)
     protocol = metric.name == Unit.name
     samples = UniformSamples(limit, SAMPLES) if protocol else None
-    rmse_eq11, _ = remaining_error(
-        source, m_b, distribution(FITTED["n"]), n_eq11, metric, limit if protocol else None
-    )
+    by_eq11 = source, m_b, distribution(FITTED["n"])
+    if samples is None:
+        rmse_eq11, _ = remaining_error(*by_eq11, n_eq11, metric)
+    else:
+        rows = np.arange(m_b.size)
+        distance, _ = Problem(*by_eq11, metric, samples, rows).distance(np.log(n_eq11), rows)
+        rmse_eq11 = np.sqrt(distance / SAMPLES)
     columns = {"m_b": m_b, "n_eq11": n_eq11, "rmse_n_eq11": rmse_eq11}
     targets = FITTED | (further_targets() if extended else {})
     for column, name in targets.items():
@@ -183,7 +190,7 @@ def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dic
             columns[column] = best
         _check_answers(m_b, best, name)
         if samples is None:
-            rmse, _ = remaining_error(source, m_b, target, best, metric, gamma=gamma)
+            rmse, _ = remaining_error(source, m_b, target, best, metric, gamma)
         else:
             # A degree of freedom is spent for each parameter.
             rmse = np.sqrt(np.maximum(distance, 0) / (SAMPLES - len(target.parameters)))

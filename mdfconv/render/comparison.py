@@ -14,7 +14,6 @@ from mdfconv.brdf.materials import material
 from mdfconv.brdf.microsurface import Microsurface
 from mdfconv.brdf.reflection import BRDFS
 from mdfconv.conversion import convert, method_named
-from mdfconv.conversion.remaining_error import lobe_extent
 from mdfconv.distributions import distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import number_text
@@ -22,7 +21,7 @@ from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.metrics.display import srgb
 from mdfconv.output.records import rounded_rows
-from mdfconv.paper.error_curves import DRAWN, PAPER_SETS
+from mdfconv.paper.error_curves import DRAWN, PAPER_SETS, lobe_extent
 from mdfconv.render.sphere import LIGHTS, Frame, cross_section, radiance
 
 _SECTION_POINTS = 401

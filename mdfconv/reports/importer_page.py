@@ -26,13 +26,14 @@ from mdfconv.scene.shininess import (
 
 _EXPONENTS = np.geomspace(1, 1e4, 81)
 _SHOWN = np.array([1.0, 3, 10, 30, 100, 300, 1000, 3000, 10000])
-_LIGHT = "energy"
-_OURS = _LIGHT, "display"
+_LIGHT = "environment"
+_OURS = _LIGHT, "energy", "display"
 _STYLES = {
     "1 - Ns/1000": ("#0072B2", "-."),
     "1 - sqrt(Ns/1000)": ("#E69F00", (0, (4, 2))),
     "1 - sqrt(Ns)/10": ("#CC79A7", ":"),
-    "energy": ("#000000", "-"),
+    "environment": ("#000000", "-"),
+    "energy": ("#999999", (0, (5, 1))),
     "display": ("#009E73", (0, (8, 2))),
 }
 
@@ -49,7 +50,7 @@ def importer_page() -> Artefact:
     }
     at_100 = rows[int(np.flatnonzero(_SHOWN == 100)[0])]
     by_rule = ", ".join(f"{at_100[rule]:g}" for rule in IMPORTER_RULES)
-    summary = f"at Ns = 100 the rules give roughness {by_rule}; the light asks for "
+    summary = f"at Ns = 100 the rules give roughness {by_rule}; natural light asks for "
     return Artefact(
         files,
         "what becomes of Ns in a renderer with roughness",
@@ -119,8 +120,8 @@ def _draw(curves: dict[str, Array]) -> bytes:
         xscale="log",
         yscale="log",
         xlabel="Ns",
-        ylabel="RMSE of D / max D of Blinn/Phong",
-        title="Error of the light, up to where a rule makes a mirror",
+        ylabel="relative RMSE under environment",
+        title="Error, up to where a rule makes a mirror",
     )
     figure.legend(loc="outside lower center", ncols=5)
     return encoded(figure, dpi=110)
@@ -132,13 +133,14 @@ _PROSE = """\
 ![Roughness and error over Ns](importers.png)
 
 Importers in wide use map a Wavefront exponent to the roughness of GGX (α = Pr²) by 1 − Ns/1000,
-1 − √(Ns/1000) or 1 − √Ns/10, clipped to [0, 1]. `energy` is the roughness whose light is nearest to
-that of Blinn/Phong (`mdfconv mtl`), `display` the one whose picture on a screen is. RMSE: of the
-normalized distributions, relative to Blinn/Phong's peak, on β from 0 to 4.8 β_half; `mirror` is a
-roughness of 0, which has no highlight to compare.
+1 − √(Ns/1000) or 1 − √Ns/10, clipped to [0, 1]. `environment` is the roughness that keeps the light
+of a natural environment (`mdfconv mtl`), `energy` that of the sun or a lamp, `display` the picture
+on a screen. RMSE: relative, under the environment metric; `mirror` is a roughness of 0, which has
+no highlight to compare.
 
 The answer is a power: Pr ≈ {formula} is right within {formula_error} from Ns {range}
-(`mdfconv formula --from blinn-phong --to ggx:roughness --metric energy`). The rules are too rough,
+(`mdfconv formula --from blinn-phong --to ggx:roughness`). The rules are too rough,
 by up to {times} times, then too smooth, from Ns = {smooth} on, and end at
 Ns = {mirror}, from where on they make a perfect mirror of everything. What remains of
-the error of `energy` is the difference between the two distributions, which no roughness mends."""
+the error of `environment` is the difference between the two distributions, which no roughness
+mends."""

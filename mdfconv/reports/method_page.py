@@ -120,7 +120,7 @@ def _prose(
         chosen = [row for key, row in rows.items() if key[:2] == (_SWEEP, metric)]
         return min(chosen, key=lambda row: row["median"])
 
-    light, picture = nearest("energy"), nearest("display")
+    light, natural, picture = (nearest(name) for name in ("energy", "environment", "display"))
     missing = [1 - row["answered"] for row in rows.values() if row["range"] == _ROUGHER]
     text = _PROSE.format(
         count=count,
@@ -133,6 +133,9 @@ def _prose(
         light_method=light["method"],
         light_median=percent(light["median"]),
         light_rmse=f"{light['excess_rmse_worst']:.2g}",
+        environment=percent(rows[_SWEEP, "environment", "closed-form"]["median"]),
+        environment_method=natural["method"],
+        environment_median=percent(natural["median"]),
         picture_method=picture["method"],
         picture_median=percent(picture["median"]),
         missing=f"{percent(min(missing))} to {percent(max(missing))}",
@@ -147,7 +150,7 @@ _PROSE = """\
 Every method on every ordered pair of {count} one-parameter distributions ({left_out}, which are \
 one, left out), for lobes as wide as Beckmann's at the m_B given, against the best fit under each \
 metric. `answered`: the share of the lobes. `median` and `worst`: |p/p_fit − 1| of the parameter. \
-`excess_rmse`: the RMSE under the metric, relative to the source's peak, beyond that of the best \
+`excess_rmse`: the relative RMSE under the metric beyond that of the best \
 fit. `fit` and `fast` have 0 in every column: `fast` is within 1e-6 of `fit` (1e-4 for the \
 picture) at the price of a formula (`mdfconv bench`).
 
@@ -157,14 +160,15 @@ For choosing:
 the best parameter. The worst are Schlick's, whose m_B the paper takes from Beckmann's, up to \
 {borrowed} off; the others are within {own}. There `closed-form` is a fair default, and \
 `half-angle`, {half_angle} off in the median, is not.
-- For the *light* the closed forms are wrong by {light} in the median. Of the formulas \
-`{light_method}` comes nearest: {light_median} in the median, with an RMSE that is at most \
-{light_rmse} above that of the best fit.
+- For the *light* of the sun or a lamp the closed forms are wrong by {light} in the median. Of the \
+formulas `{light_method}` comes nearest: {light_median} in the median, with an RMSE that is at \
+most {light_rmse} above that of the best fit. For that of a natural environment they are wrong by \
+{environment}, and `{environment_method}`, the nearest, by {environment_median}.
 - For the *picture* no formula comes near: the nearest, `{picture_method}`, is {picture_median} \
 off in the median.
 - Rougher than the sweep, no formula is good for anything, and each has no answer for {missing} \
 of the lobes.
 
-A renderer with normalized distributions is served better by `fast --metric energy` than by the \
-default. The default stays the paper's closed form: it is what is printed, and what is to be kept \
-is for the user to say."""
+A renderer with normalized distributions is served by `--metric environment`, which the commands \
+for scenes (mtl, texture, formula, recommend) take unasked. Without a metric `convert` stays the \
+paper's closed form: it is what is printed, and what is to be kept is for the user to say."""

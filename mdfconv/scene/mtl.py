@@ -38,8 +38,7 @@ class Material:
     shininess, roughness : float
         Ns and Pr: the one that was converted, and its conversion.
     rmse : float
-        The error that the conversion leaves: root mean square under the metric, relative to the
-        peak of Blinn/Phong.
+        The error that the conversion leaves: the relative root mean square of `explain`.
     notes : tuple of str
         What a careful user must know.
     """
@@ -106,7 +105,7 @@ def convert_mtl(
     data: bytes,
     to: str = To.roughness,
     *,
-    metric: str | Metric = "energy",
+    metric: str | Metric = "environment",
     replace: bool = False,
     texture_names: dict[str, str] | None = None,
 ) -> MtlConversion:
@@ -120,8 +119,8 @@ def convert_mtl(
         ``"roughness"``: each material with an Ns gets the Pr of the GGX (α = Pr²) that fits
         best. ``"shininess"``: each with a Pr gets the Ns whose best GGX that is.
     metric : str or Metric
-        What the fit keeps; readers of Pr use normalized distributions, so by default the
-        light.
+        What the fit keeps; readers of Pr use normalized distributions in scenes with light
+        from all around, so by default that.
     replace : bool
         Drop the statement that was converted.
     texture_names : dict, optional

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.metrics import Metric, metric_named
+from mdfconv.fitting.metrics import Metric
 from mdfconv.scene.mtl import TextureStatement
-from mdfconv.scene.shininess import ROUGHNESS, SHININESS, method_for
+from mdfconv.scene.shininess import ROUGHNESS, SHININESS
 from mdfconv.scene.texture import convert_texture_file
 from mdfconv.scene.texture_rule import TextureRule
 
@@ -46,8 +46,7 @@ def convert_textures(
     rule = TextureRule(
         f"{SHININESS}:exponent",
         ROUGHNESS,
-        method_for(metric_named(metric)),
-        str(metric),
+        metric=str(metric),
         exponent_max=exponent_max,
     )
     rule.endpoints()

@@ -10,22 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mdfconv.conversion import convert, method_named
+from mdfconv.conversion import convert
 from mdfconv.conversion.endpoint import endpoints
 from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
 
 SHININESS, ROUGHNESS = "blinn-phong", "ggx:roughness"
-# From here on the stored polynomials answer, where there are some for the metric.
-_LEAST_STORED = 0.1
 # Pr at these is 1 − 2e-7 and 4e-5: no library means anything beyond.
 _LEAST, _MOST = 1e-6, 1e18
-
-
-def method_for(metric: Metric) -> str:
-    """Return the name of the method that fits under a metric: the stored fits where they are."""
-    return "fast" if method_named("fast").covers_metric(metric) else "fit"
 
 
 def roughness_of(exponent: Array, metric: Metric) -> Array:
@@ -44,10 +37,8 @@ def roughness_of(exponent: Array, metric: Metric) -> Array:
         Pr from 0 to 1; 1 for Ns 0, which is uniform.
     """
     roughness = np.ones_like(exponent)
-    stored = exponent >= _LEAST_STORED
-    rest = (exponent >= _LEAST) & ~stored
-    for rows, method in ((stored, method_for(metric)), (rest, "fit")):
-        roughness[rows] = convert(exponent[rows], SHININESS, ROUGHNESS, method, metric=metric)
+    lobes = exponent >= _LEAST
+    roughness[lobes] = convert(exponent[lobes], SHININESS, ROUGHNESS, metric=metric)
     return roughness
 
 
@@ -81,19 +72,19 @@ def exponent_of(roughness: Array, metric: Metric) -> Array:
 
 
 def error_of(exponent: Array, roughness: Array, metric: Metric) -> Array:
-    """Return the RMSE of GGX in Blinn/Phong's place, relative to the latter's peak.
+    """Return the error of GGX in Blinn/Phong's place.
 
     Parameters
     ----------
     exponent, roughness : numpy.ndarray, shape (n,)
         Ns ≥ 0 and Pr from 0 to 1.
     metric : Metric
-        Under which the error is taken, on β from 0 to 4.8 β_half of Blinn/Phong.
+        Under which the error is taken.
 
     Returns
     -------
     numpy.ndarray, shape (n,)
-        RMSE; infinite for a mirror (Pr 0).
+        The relative root mean square of `remaining_error`; infinite for a mirror (Pr 0).
     """
     source, target = endpoints(SHININESS, ROUGHNESS)
     lobes = roughness > 0

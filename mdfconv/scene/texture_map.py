@@ -61,6 +61,8 @@ class TextureReport:
     ----------
     source, target : str
         Distribution and encoding.
+    keeps : str
+        What the conversion keeps, in words; "" if the two are the same lobes.
     texels : int
         How many were converted.
     outcomes : dict of Outcome to int
@@ -71,6 +73,7 @@ class TextureReport:
 
     source: str
     target: str
+    keeps: str
     texels: int
     outcomes: dict[Outcome, int]
     before: NDArray[np.int64]
@@ -152,6 +155,7 @@ class TexelMap:
             before = self._histogram_of_counts()
         return TextureReport(
             *self._convert.labels,
+            self._convert.keeps,
             texels=int(outcomes.sum()),
             outcomes=dict(zip(Outcome, outcomes.tolist(), strict=True)),
             before=before,

@@ -34,12 +34,12 @@ class TextureRule:
         Parameters that scenes use beyond 1, as exponents, need an encoding:
         ``"blinn-phong:exponent"`` stores N / `exponent_max`, ``"blinn-phong:log2"`` v with
         N = 2^(k v).
-    method : str
-        As for `mdfconv.convert`. The default is ``"fast"``: textures use the whole range, on
-        which the closed forms turn around or turn negative, and it is the fit in milliseconds.
+    method : str, optional
+        As for `mdfconv.convert`: the fit under the metric if not given, as textures use the
+        whole range, on which the closed forms turn around or turn negative.
     metric : str
-        What the fit keeps: ``"unit"``, ``"energy"``, ``"environment"`` or ``"display"``, with an
-        exposure ``"display:4"``.
+        What the fit keeps, as for `mdfconv.convert`; the light of a natural environment by
+        default.
     exponent_max : float
         N of a texel at 1 under ``exponent``; above 0. 1000 is the end of MTL's range.
     log2_scale : float
@@ -51,8 +51,8 @@ class TextureRule:
 
     source: str
     target: str
-    method: str = "fast"
-    metric: str = "unit"
+    method: str | None = None
+    metric: str = "environment"
     exponent_max: float = EXPONENT_MAX
     log2_scale: float = LOG2_SCALE
     gamma: float | None = None

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdfconv.conversion.equivalence import exact_route, follow
-from mdfconv.conversion.methods import method_named
+from mdfconv.conversion.methods import default_method, method_named
 from mdfconv.conversion.refusals import check_covered
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
@@ -56,9 +56,10 @@ class ValueConverter:
 
     def __init__(self, rule: TextureRule) -> None:
         self._source, self._target = rule.endpoints()
-        self._method = method_named(rule.method)
         self._metric = metric_named(rule.metric)
-        self._exact = exact_route(self._source.distribution, self._target.distribution)
+        pair = self._source.distribution, self._target.distribution
+        self._method = default_method(*pair) if rule.method is None else method_named(rule.method)
+        self._exact = exact_route(*pair)
         if self._exact is None:
             check_covered(self._method, self._metric, self._source, self._target)
         # Which of 0 and 1 stands for the smoothest surface.
@@ -70,6 +71,11 @@ class ValueConverter:
     def labels(self) -> tuple[str, str]:
         """Names of source and target, such as ``"ggx:roughness"``."""
         return self._source.label, self._target.label
+
+    @property
+    def keeps(self) -> str:
+        """What the conversion keeps, in words; "" if the two are the same lobes."""
+        return self._method.keeps(self._metric) if self._exact is None else ""
 
     def __call__(self, stored: Array) -> tuple[Array, NDArray[np.uint8]]:
         """Convert stored values (float64, any shape).

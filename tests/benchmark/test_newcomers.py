@@ -27,6 +27,7 @@ class Cosine(BlinnPhong):
     """A form that takes no tangent."""
 
     name = "cosine-power"
+    encodings = ()
     aliases = ()
     functions = ("log1p", "exp")
     map_variables = None

@@ -45,7 +45,7 @@ def answer(*arguments):
 
 
 def test_answer_is_within_the_tolerance_and_explained():
-    answered = answer("--from", "beckmann", 0.2, "--tolerance", 0.05)
+    answered = answer("--from", "beckmann", 0.2, "--tolerance", 0.05, "--metric", "unit")
     first, *rest = answered["candidates"]
     assert answered["chosen"] == first["distribution"]
     assert first["chosen"]

@@ -31,7 +31,7 @@ def test_pair():
 
 def test_json():
     status, out, err = run(
-        "convert", "--from", "phong", "--to", "ggx:roughness", "--format", "json", 100, 2
+        "convert", "--from", "blinn", "--to", "ggx:roughness", "--format", "json", 100, 2
     )
     assert (status, err) == (0, "")
     first, second = json.loads(out)
@@ -43,7 +43,7 @@ def test_json():
     assert first["value"] == 100
     assert first["result"] == mdfconv.convert(100, "blinn-phong", "ggx:roughness")
     assert first["method"] == "closed-form"
-    assert 0 < first["rmse"] < first["max_error"] < 0.1
+    assert 0 < first["max_error"] < first["rmse"] < 0.1
     assert isinstance(first["notes"], list)
     assert "outside the paper's sweep" in second["notes"][0]
 
@@ -131,8 +131,10 @@ def test_table_on_a_terminal():
     rows = [line for line in out.splitlines() if "0.23552" in line or "peak" in line]
     assert "closed-form" in rows[0]
     assert "peak" in rows[-1]
-    for method in ("half-angle", "ward", "peak"):
+    for method in ("half-angle", "fit", "fast"):
         assert method in out
+    for purpose in ("sun or lamp, linear light", "natural light", "as seen on a screen"):
+        assert purpose in out
     plain = run_on_terminal("convert", "--from", "beckmann", "--to", "ggx", "0.2", NO_COLOR="1")[1]
     assert not re.search(r"\x1b\[[39][0-7]m", plain)
     assert "0.23552" in plain

@@ -119,6 +119,35 @@ def test_encodings():
     assert convert(expected, "ggx:roughness", "blinn-phong") == pytest.approx(100, rel=2e-3)
 
 
+@pytest.mark.parametrize(
+    ("exponent", "limit"), [(1, 0.08), (2, 0.05), (10, 0.0065), (100, 5e-4), (1000, 5e-5)]
+)
+def test_phongs_own_exponent(exponent, limit):
+    """The cumulative distribution of Phong's lobe at normal incidence is 1 − cos^(n+1) 2β."""
+    given_ = mdfconv.convert(exponent, "blinn-phong:reflected", "blinn-phong")
+    beta = np.geomspace(1e-5, 1, 20001) * np.pi / 2
+    phong = 1 - np.maximum(np.cos(2 * beta), 0) ** (exponent + 1)
+    blinn = mdfconv.distribution("blinn-phong").cumulative(beta, given_)
+    # Under the environment metric: dβ / sin 2β = ½ d ln tan β.
+    logarithm = np.log(np.tan(np.minimum(beta, np.pi / 2 - 1e-9)))
+    squares = [
+        np.trapezoid(np.square(part), logarithm)
+        for part in (blinn - phong, phong - np.sin(beta) ** 2)
+    ]
+    assert np.sqrt(squares[0] / squares[1]) < limit
+    back = mdfconv.convert(given_, "blinn-phong", "blinn-phong:reflected")
+    assert back == pytest.approx(exponent, rel=1e-14)
+
+
+def test_phong_says_which_exponent_it_takes():
+    (asked,) = mdfconv.explain(100, "phong", "ggx", metric="environment")
+    assert "blinn-phong:reflected" in asked.notes[0]
+    assert mdfconv.explain(100, "blinn-phong", "ggx")[0].cautions == ()
+    assert mdfconv.explain(100, "blinn", "ggx")[0].cautions == ()
+    with pytest.raises(mdfconv.MdfconvError, match="known: reflected"):
+        mdfconv.convert(100, "blinn-phong:alpha", "ggx")
+
+
 def test_shapes_and_types():
     convert = mdfconv.convert
     assert type(convert(0.2, "beckmann", "ggx")) is float

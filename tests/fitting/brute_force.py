@@ -143,6 +143,16 @@ class Problem:
         )
         return np.sum(self.weight(grid) * (above - below) * (above + below - 2 * source))
 
+    def errors(self, parameter):
+        """Return the relative root mean square and maximum error of a target."""
+        lobes = Lobe(self.target, parameter), self.source
+        grid = self.grid(lobes)
+        target, source = (self.signal(lobe.form(grid), lobe.highest(grid), grid) for lobe in lobes)
+        # A uniform lobe leaves no contrast.
+        signal = source - grid.sin2 if self.metric == "environment" else source
+        squares = [np.sum(self.weight(grid) * part**2) for part in (target - source, signal)]
+        return np.sqrt(squares[0] / squares[1]), np.abs(target - source).max() / signal.max()
+
     def signal(self, form, highest, grid):
         if self.metric == "unit":
             return form / highest

@@ -50,7 +50,7 @@ def test_table_is_what_convert_says_of_each_texel(source, target, method):
     compared = 0
     for level, texel in enumerate(texels):
         try:
-            answer = mdfconv.convert(level / 255, *ends, method)
+            answer = mdfconv.convert(level / 255, *ends, method, metric="environment")
         except MdfconvError:
             continue
         assert texel == round(min(max(answer, 0), 1) * 65535)
@@ -79,7 +79,7 @@ def test_the_metric_spells_its_exposure():
 def test_a_second_parameter(target):
     few = np.array([0.2, 0.6])
     rule = TextureRule("ggx:alpha", target, "fit", gamma=3.0)
-    expected = mdfconv.convert(few, "ggx", target, "fit", gamma=3.0)
+    expected = mdfconv.convert(few, "ggx", target, "fit", metric="environment", gamma=3.0)
     assert np.array_equal(convert_texture(few, rule), expected)
     # The usual γ makes both GGX.
     assert np.array_equal(convert_texture(few, TextureRule("ggx", target)), few)
@@ -291,7 +291,7 @@ def test_arrays_that_are_no_texture(array, options, words):
         (("ggx", "ggy"), "did you mean"),
         (("gauss", "ggx", "ward"), "ward has no conversion"),
         (("ggx", "beckmann", "fast", "energetic"), "metric"),
-        (("ggx", "beckmann", "fast", "display:2"), "fast has no conversions stored .*; use fit"),
+        (("ggx", "beckmann", "fast", "display:2"), "fast has no conversion stored .*; use fit"),
         (("blinn-phong:exponent", "ggx", "fast", "unit", 0.0), "above 0"),
         (("blinn-phong:log2", "ggx", "fast", "unit", 1e3, np.inf), "log2"),
         (("ggx", "beckmann", "fast", "unit", 1e3, 13.0, 2.0), "neither ggx nor beckmann has a sec"),

@@ -14,7 +14,7 @@ from mdfconv.registry import Registry
 __all__ = ["Metric", "list_metrics", "metric_named", "register_metric"]
 
 # The default first.
-_MODULES = ("unit", "energy", "display", "environment")
+_MODULES = ("unit", "energy", "display", "environment", "light")
 
 _REGISTRY: Registry[type[Metric]] = Registry("metric")
 
@@ -35,8 +35,8 @@ for _module in _MODULES:
 
 
 def list_metrics() -> list[str]:
-    """Return the names of the metrics, the default first."""
-    return _REGISTRY.names
+    """Return the names of the metrics, the default first, but for those that need a setting."""
+    return [kind.name for kind in _REGISTRY if not kind.needs_setting]
 
 
 def metric_named(name: str | Metric) -> Metric:
@@ -46,7 +46,7 @@ def metric_named(name: str | Metric) -> Metric:
     ----------
     name : str or Metric
         One of `list_metrics`, with a setting after a colon if it has one: the exposure of
-        ``display``, 1 if not given. A metric is returned as it is.
+        ``display``, 1 if not given; or ``"light:FILE"``. A metric is returned as it is.
 
     Raises
     ------
@@ -59,4 +59,4 @@ def metric_named(name: str | Metric) -> Metric:
         raise MdfconvError(f"a metric is named by a string, not {name!r}")
     head, colon, setting = name.partition(":")
     kind = _REGISTRY[head]
-    return kind.with_setting(setting) if colon else kind()
+    return kind.with_setting(setting) if colon or kind.needs_setting else kind()

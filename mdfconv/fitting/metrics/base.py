@@ -10,6 +10,13 @@ import numpy as np
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.quadrature import LobeQuadrature, Quadrature
+
+
+def scaled(parameter: Array, ratio: float, target: Distribution) -> Array:
+    """Return the fits of a pair that has a `Metric.ratio`, within the target's legal range."""
+    limited: Array = np.minimum(parameter * ratio, target.parameter.upper)
+    return limited
 
 
 class Metric(ABC):
@@ -21,21 +28,30 @@ class Metric(ABC):
         What a fit under the metric keeps, and what its signal S is, in words.
     word : str
         What it keeps, in one word.
+    purpose : str
+        Where that is right, in a few.
     normalized : bool
         Whether D is the normalized or the unit form.
     kinks : tuple of float
         Values of D/P at which S is not smooth.
     setting : str
         What may follow the name and a colon, in a word; "" for nothing.
+    needs_setting : bool
+        Whether it must.
+    over_angles : bool
+        Whether S is a function of β.
     """
 
     name: ClassVar[str]
     keeps: ClassVar[str]
     word: ClassVar[str]
+    purpose: ClassVar[str]
     quantity: ClassVar[str]
     normalized: ClassVar[bool]
     kinks: tuple[float, ...] = ()
     setting: ClassVar[str] = ""
+    needs_setting: ClassVar[bool] = False
+    over_angles: ClassVar[bool] = True
 
     @classmethod
     def with_setting(cls, text: str) -> Self:
@@ -55,6 +71,10 @@ class Metric(ABC):
     @abstractmethod
     def weight(self, beta: Array) -> Array:
         """Return w at an angle, radians."""
+
+    def quadrature(self, half_width: Array) -> Quadrature:
+        """Return where S is sampled, for lobes of which β_half is the narrowest, radians."""
+        return LobeQuadrature(half_width)
 
     def ratio(self, source: Distribution, target: Distribution) -> float | None:
         """Return p_target/p_source of the fit where that is one constant, else None."""

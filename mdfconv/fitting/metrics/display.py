@@ -28,6 +28,7 @@ class Display(Energy):
     name = "display"
     keeps = "picture on a screen"
     word = "picture"
+    purpose = "as seen on a screen"
     quantity = "normalized D as a screen shows it"
     setting = "exposure"
 

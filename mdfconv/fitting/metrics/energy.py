@@ -14,6 +14,7 @@ class Energy(Metric):
     name = "energy"
     keeps = "light"
     word = "light"
+    purpose = "sun or lamp, linear light"
     quantity = "normalized D / max D of the reference"
     normalized = True
 

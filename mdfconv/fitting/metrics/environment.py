@@ -31,6 +31,7 @@ class Environment(Metric):
     name = "environment"
     keeps = "light of a natural environment"
     word = "environment"
+    purpose = "natural light"
     quantity = "share of the facets within β, beyond a uniform lobe's"
     normalized = True
 

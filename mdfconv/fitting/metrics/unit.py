@@ -14,6 +14,7 @@ class Unit(Metric):
     name = "unit"
     keeps = "shape of the lobe"
     word = "shape"
+    purpose = "lobe's shape"
     quantity = "unit form D / max D"
     normalized = False
 

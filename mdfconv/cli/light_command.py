@@ -1,0 +1,82 @@
+"""``mdfconv light``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mdfconv.cli.options import Format, FormatOption, PngOption
+from mdfconv.cli.outputs import check_outputs, write_named
+from mdfconv.cli.tables import console, form_of, tell, write_table
+from mdfconv.output.records import csv_text, json_text
+
+if TYPE_CHECKING:
+    from mdfconv.scene.light import LightReport
+
+_ROUGHNESSES = (0.05, 0.1, 0.2, 0.4)
+
+
+def command(
+    map_: Annotated[
+        Path,
+        typer.Argument(
+            metavar="MAP", help="Environment map, 2:1: OpenEXR, Radiance .hdr or another picture."
+        ),
+    ],
+    m_b: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--m-b", metavar="M", help="Beckmann's m_B; repeatable; by default 0.05 to 0.4."
+        ),
+    ] = None,
+    spectrum: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE", help="Write the spectrum as CSV.")
+    ] = None,
+    png: PngOption = None,
+    format_: FormatOption = None,
+) -> None:
+    """Say what a light asks of a conversion: its spectrum, and the best GGX for Beckmann.
+
+    Prints α under the light of an environment map beside that of --metric energy (a sun or a
+    lamp), environment (natural light) and display (a screen). The exponent of the spectrum says
+    how soft the light is. Any conversion under the light: --metric light:MAP.
+
+    Examples:
+
+    mdfconv light studio.exr
+
+    mdfconv light studio.exr --png spectrum.png --csv spectrum.csv
+
+    mdfconv convert --from beckmann --to ggx --metric light:studio.exr 0.2
+    """
+    from mdfconv.output.files import file_bytes
+    from mdfconv.scene.light import light_report
+
+    check_outputs(png, spectrum, inputs=[map_])
+    report = light_report(map_, m_b or _ROUGHNESSES)
+    contents: dict[Path, bytes] = {}
+    if spectrum:
+        rows = report.spectrum_rows()
+        contents[spectrum] = file_bytes(csv_text(list(rows[0]), rows))
+    if png:
+        from mdfconv.scene.light_figure import draw_spectrum
+
+        contents[png] = draw_spectrum(report.spectrum, map_.name)
+    _write(report, map_, form_of(format_))
+    write_named(contents)
+
+
+def _write(report: LightReport, path: Path, form: Format) -> None:
+    rows = report.conversions
+    if form is Format.json:
+        light = {"exponent": report.spectrum.exponent, "softness": report.softness}
+        answers = {"conversions": rows, "spectrum": report.spectrum_rows()}
+        typer.echo(json_text({"map": str(path), **light, **answers}))
+        return
+    write_table(list(rows[0]), rows, form, title="α of the best GGX for Beckmann's m_B")
+    if form is Format.table:
+        console().print(report.sentence)
+    else:
+        tell(report.sentence)

@@ -1,0 +1,1 @@
+"""Light: environment maps, their angular power spectra, and those of lobes."""

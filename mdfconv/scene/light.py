@@ -1,0 +1,88 @@
+"""What an environment map is for conversions: its spectrum, and the best GGX for Beckmann."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mdfconv.distributions import distribution
+from mdfconv.fitting.fit import fit
+from mdfconv.fitting.metrics import metric_named
+from mdfconv.fitting.metrics.light import Light
+from mdfconv.light.spectrum import FIRST_OF_LAW, Spectrum, spectrum_of_file
+
+SOURCE, TARGET = "beckmann", "ggx"
+# What the light's own answer is shown beside.
+METRICS = ("energy", "environment", "display")
+# The exponents between which lights lie: of a point, and of the softest of eighteen real
+# environments, overcast skies and rooms.
+SUN, OVERCAST = 0.0, 2.8
+
+
+@dataclass(frozen=True)
+class LightReport:
+    """A light, and what it asks for.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        C_l.
+    softness : float
+        Where its exponent lies between that of a sun, 0, and of an overcast sky, 1.
+    conversions : list of dict
+        A row for each m_B: ``m_b``, α of the best GGX under the ``light``, the ``ratio`` of
+        the two, and that α under each of `METRICS`.
+    """
+
+    spectrum: Spectrum
+    softness: float
+    conversions: list[dict[str, float]]
+
+    @property
+    def sentence(self) -> str:
+        """What the light is, in words."""
+        return (
+            f"C_l falls like l^−{self.spectrum.exponent:.2f} (l from {FIRST_OF_LAW} to "
+            f"{self.spectrum.highest}): {100 * self.softness:.0f} % of the way from a sun "
+            f"({SUN:g}) to an overcast sky ({OVERCAST:g}); nature's 1/f² is 2."
+        )
+
+    def spectrum_rows(self) -> list[dict[str, Any]]:
+        """Return degree, measured C_l and that of the power law, from l = 1."""
+        degree = np.arange(1, self.spectrum.highest + 1)
+        columns = degree, self.spectrum.power[1:], self.spectrum.law(degree + 0.5)
+        return [
+            {"l": degree, "c_l": power, "power_law": law}
+            for degree, power, law in zip(*(column.tolist() for column in columns), strict=True)
+        ]
+
+
+def light_report(path: str | Path, m_b: Sequence[float]) -> LightReport:
+    """Return what an environment map is, and the best GGX for Beckmann under it.
+
+    Parameters
+    ----------
+    path : str or Path
+        The map.
+    m_b : sequence of float
+        Beckmann's parameters.
+
+    Raises
+    ------
+    MdfconvError
+        As `read_environment_map`, and if an m_B is illegal.
+    """
+    source, target = distribution(SOURCE), distribution(TARGET)
+    parameter = np.array([source.parameter.check_one(value, SOURCE) for value in m_b])
+    spectrum = spectrum_of_file(path)
+    own = fit(source, parameter, target, Light(spectrum)).parameter
+    columns = {"m_b": parameter, "light": own, "ratio": own / parameter}
+    for name in METRICS:
+        columns[name] = fit(source, parameter, target, metric_named(name)).parameter
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    softness = float(np.clip((spectrum.exponent - SUN) / (OVERCAST - SUN), 0, 1))
+    return LightReport(spectrum, softness, [dict(zip(columns, row, strict=True)) for row in rows])

@@ -14,13 +14,12 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 import mdfconv
-from mdfconv.conversion import fast
-from mdfconv.conversion.equivalence import exact_route, to_root
 from mdfconv.distributions import one_parameter_distributions
-from mdfconv.fitting.fit import fit
+from mdfconv.distributions.equivalence import exact_route, to_root
+from mdfconv.fitting import maps
+from mdfconv.fitting.fit import cold_fit
 from mdfconv.fitting.metrics import list_metrics, metric_named
 
-FILE = Path(fast.__file__).parent / "data" / fast.DATA
 # A distribution that is another one in another parameter is a target of its own: near a uniform
 # lobe its parameter resolves more.
 TARGETS = [entry.name for entry in one_parameter_distributions() if entry.map_variables]
@@ -57,13 +56,13 @@ class Pair:
 
     def answer(self, x):
         """Return the fit's parameter, NaN where there is none that is usable."""
-        got = fit(self.source, self.parameter(x), self.target, self.metric).parameter
+        got = cold_fit(self.source, self.parameter(x), self.target, self.metric).parameter
         with np.errstate(invalid="ignore"):
             return np.where(got >= LEAST_TARGET.get(self.names[1], 0), got, np.nan)
 
     def limited(self, x):
         """Return where the fit lies at the end of the target's legal range."""
-        return fit(self.source, self.parameter(x), self.target, self.metric).at_limit
+        return cold_fit(self.source, self.parameter(x), self.target, self.metric).at_limit
 
     def stored(self, x, answer):
         """Return the function that is to be stored."""
@@ -172,7 +171,7 @@ def make(key):
     last = 1.0 if pair.factored and source == "ggx" else end
     edges = np.array([low for low, *_ in found] + [last])
     powers = tuple(power for _, _, power, _ in found)
-    entry = fast.Map(edges, powers, pair.factored)
+    entry = maps.Map(edges, powers, pair.factored)
     worst = max(piece[-1] for piece in found)
     sizes = [power.size for _, _, power, _ in found]
     return key, entry, f"to x = {end:.6f}, worst {worst:.1e}, terms {sizes}"
@@ -186,7 +185,7 @@ def needs_map(metric_name, source, target):
     return metric_named(metric_name).ratio(*roots) is None
 
 
-def main(path=FILE):
+def main(path=maps.FILE):
     """Write the data file."""
     keys = [
         f"{name} {source} {target}"
@@ -194,13 +193,13 @@ def main(path=FILE):
         for source, target in itertools.product(SOURCES, TARGETS)
         if needs_map(name, mdfconv.distribution(source), mdfconv.distribution(target))
     ]
-    maps = {}
+    made = {}
     with ProcessPoolExecutor() as pool:
         for key, entry, summary in pool.map(make, keys):
-            maps[key] = entry
+            made[key] = entry
             print(f"{key}: {summary}", flush=True)
     Path(path).parent.mkdir(exist_ok=True)
-    np.savez_compressed(path, **fast.pack(maps))
+    np.savez_compressed(path, **maps.pack(made))
     print(f"{path}: {Path(path).stat().st_size} bytes")
 
 

@@ -13,10 +13,10 @@ import numpy as np
 from mdfconv.benchmark.stability_finding import Finding, Tallies, read_rows
 from mdfconv.conversion import convert, list_methods
 from mdfconv.conversion.endpoint import Endpoint
-from mdfconv.conversion.equivalence import exact_route
 from mdfconv.conversion.formulas import FormulaMethod
 from mdfconv.conversion.method import Method
 from mdfconv.distributions import Distribution, distribution
+from mdfconv.distributions.equivalence import exact_route
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import metric_named
 

@@ -8,11 +8,11 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from mdfconv.conversion.endpoint import Endpoint, endpoints
-from mdfconv.conversion.equivalence import exact_route, follow
 from mdfconv.conversion.method import Method
 from mdfconv.conversion.methods import default_method, method_named
 from mdfconv.conversion.refusals import check_covered, check_pair, unreachable
-from mdfconv.distributions.evaluation import Array, as_operand
+from mdfconv.distributions.equivalence import exact_route, follow
+from mdfconv.distributions.evaluation import Array, Mask, as_operand
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError, MdfconvWarning
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
@@ -151,7 +151,7 @@ def apply(
 
 def apply_free(
     metric: Metric, parameter: Array, source: Endpoint, target: Endpoint
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Mask]:
     """Fit both parameters of the target to legal parameters.
 
     Returns
@@ -164,11 +164,9 @@ def apply_free(
     from mdfconv.fitting.free_gamma import fit_free_gamma
 
     fits = fit_free_gamma(source.distribution, parameter.ravel(), target.distribution, metric)
-    result, gamma, at_limit = (
-        array.reshape(parameter.shape) for array in (fits.parameter, fits.gamma, fits.at_limit)
-    )
+    result, gamma = (array.reshape(parameter.shape) for array in (fits.parameter, fits.gamma))
     _check_results(method_named("fit"), metric, parameter, result, source, target)
-    return target.encode(result), gamma, at_limit
+    return target.encode(result), gamma, fits.at_limit.reshape(parameter.shape)
 
 
 def _check_results(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from mdfconv.conversion.equivalence import Formula, follow, from_root, to_root
 from mdfconv.conversion.formulas import FormulaMethod
 from mdfconv.distributions import Distribution
+from mdfconv.distributions.equivalence import Formula, follow, from_root, to_root
+from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.distributions.parameter import number_text
 from mdfconv.fitting.metrics import Metric
 
@@ -93,18 +94,16 @@ class ClosedForm(FormulaMethod):
         return "shape of the lobe, approximately"
 
     def cautions(
-        self, parameter: float, result: float, source: Distribution, target: Distribution
-    ) -> list[str]:
+        self, parameter: Array, result: Array, source: Distribution, target: Distribution
+    ) -> dict[str, Mask]:
         """Add to the turning points whether the source is outside the paper's sweep."""
-        cautions = super().cautions(parameter, result, source, target)
         lower, upper = _sweep(source)
-        if not lower <= parameter <= upper:
-            cautions.insert(
-                0,
-                f"outside the paper's sweep: its formulas were fitted for {source.name} "
-                f"{source.parameter.symbol} from {number_text(lower)} to {number_text(upper)}",
-            )
-        return cautions
+        outside = (
+            f"outside the paper's sweep: its formulas were fitted for {source.name} "
+            f"{source.parameter.symbol} from {number_text(lower)} to {number_text(upper)}"
+        )
+        turned = super().cautions(parameter, result, source, target)
+        return {outside: (parameter < lower) | (parameter > upper)} | turned
 
 
 METHOD = ClosedForm(_FORMULAS, through={"sawicki": "blinn-phong"})

@@ -17,11 +17,11 @@ from mdfconv.conversion.arrays import (
     given_metric,
 )
 from mdfconv.conversion.endpoint import Endpoint, endpoints
-from mdfconv.conversion.equivalence import exact_route
 from mdfconv.conversion.method import Method
 from mdfconv.conversion.refusals import check_pair
 from mdfconv.conversion.remaining_error import remaining_error
-from mdfconv.distributions.evaluation import Array, as_operand
+from mdfconv.distributions.equivalence import exact_route
+from mdfconv.distributions.evaluation import Array, Mask, as_operand
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
 
@@ -119,6 +119,36 @@ def explain(
     return [table.conversion(pair, rows) for pair, rows in _with_rows(axes)]
 
 
+def results_and_cautions(
+    values: Array,
+    source: str | Endpoint,
+    target: str | Endpoint,
+    method: str | None = None,
+    *,
+    metric: str | Metric | None = None,
+    gamma: float | None = None,
+) -> tuple[Array, tuple[str, ...]]:
+    """Convert an array, and say what any of its values calls for; as `explain` otherwise.
+
+    Parameters
+    ----------
+    values : numpy.ndarray, shape (n,)
+        Parameters of the source.
+    source, target, method, metric, gamma
+        As for `convert`.
+
+    Returns
+    -------
+    results : numpy.ndarray, shape (n,)
+    cautions : tuple of str
+    """
+    ends = endpoints(source, target, gamma)
+    rule = chosen_method(method, *ends, gamma, metric_given=metric is not None)
+    kept = given_metric(metric)
+    table = _Table(rule, kept, ends[0].decode(values), *ends, free=False, errors=False)
+    return table.stored, table.cautions
+
+
 def _axes(values: Any, source: Endpoint, target: Endpoint) -> list[tuple[Any, ...]]:
     """Return the values as tuples of one number, or of two."""
     items = values if isinstance(values, list) else [values]
@@ -182,6 +212,7 @@ class _Table:
             self._answered_by = [method.name] * parameter.size
         else:
             self._answered_by = method.answered_by(parameter, *pair, metric)
+        self._cautions = self._all_cautions()
         self._errors = (
             self._remaining(free=free) if errors else (np.full_like(parameter, np.nan),) * 2
         )
@@ -193,6 +224,19 @@ class _Table:
         source, target = self._source.distribution, self._target.distribution
         gamma = self._gamma if free else None
         return remaining_error(source, self._parameter, target, self._result, self._metric, gamma)
+
+    @property
+    def stored(self) -> Array:
+        """The stored values of the results, shape (n,)."""
+        return self._stored
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """What any of the numbers calls for."""
+        return self._true_of(slice(None))
+
+    def _true_of(self, rows: slice) -> tuple[str, ...]:
+        return tuple(text for text, which in self._cautions.items() if which[rows].any())
 
     def conversion(self, pair: tuple[Any, ...], rows: slice) -> Conversion:
         """Return the conversion of one value."""
@@ -210,23 +254,25 @@ class _Table:
             route=self._route,
             rmse=rmse,
             max_error=max_error,
-            cautions=self._cautions(rows),
+            cautions=self._true_of(rows),
         )
 
-    def _cautions(self, rows: slice) -> tuple[str, ...]:
-        cautions = [end.caution for end in (self._source, self._target) if end.caution]
+    def _all_cautions(self) -> dict[str, Mask]:
+        """Return sentences, and which of the numbers they are true of."""
+        every = np.ones(self._parameter.shape, bool)
+        cautions = {end.caution: every for end in (self._source, self._target) if end.caution}
         if self._exact:
-            return tuple(cautions)
+            return cautions
         pair = self._source.distribution, self._target.distribution
-        axes = zip(self._parameter[rows].tolist(), self._result[rows].tolist(), strict=True)
-        cautions += [text for axis in axes for text in self._method.cautions(*axis, *pair)]
-        if self._at_limit[rows].any():
+        cautions |= self._method.cautions(self._parameter, self._result, *pair)
+        if self._at_limit.any():
             low, high = pair[1].parameters[1].fit_range
-            cautions.append(
+            sentence = (
                 f"γ of {pair[1].name} is at the end of the range in which it is looked for, "
                 f"{low:g} to {high:g}"
             )
-        return tuple(dict.fromkeys(cautions))
+            cautions[sentence] = self._at_limit
+        return cautions
 
 
 def _value(axes: list[float]) -> Value:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from mdfconv.conversion.equivalence import Formula, from_root, to_root
 from mdfconv.conversion.method import Method
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.evaluation import Array
+from mdfconv.distributions.equivalence import Formula, from_root, to_root
+from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.fitting.metrics import Metric
 
 
@@ -46,15 +46,14 @@ class FormulaMethod(Method):
         return parameter
 
     def cautions(
-        self, parameter: float, result: float, source: Distribution, target: Distribution
-    ) -> list[str]:
+        self, parameter: Array, result: Array, source: Distribution, target: Distribution
+    ) -> dict[str, Mask]:
         """Say where a formula is used beyond the point at which it turns around."""
-        cautions = []
-        value = np.asarray(parameter, dtype=float)
+        cautions = {}
         for step in self._steps(source, target) or ():
-            if value > step.turns_at:
-                cautions.append(f"beyond {step.turns_at:.3g} the formula {step.text} turns around")
-            value = np.asarray(step.function(value))
+            sentence = f"beyond {step.turns_at:.3g} the formula {step.text} turns around"
+            cautions[sentence] = parameter > step.turns_at
+            parameter = step.function(parameter)
         return cautions
 
     def _steps(self, source: Distribution, target: Distribution) -> list[Formula] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mdfconv.conversion.method import Method
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.evaluation import Array
+from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.fitting.metrics import Metric
 
 
@@ -36,13 +36,12 @@ class LeastSquares(Method):
         return fit(source, parameter.ravel(), target, metric).parameter.reshape(parameter.shape)
 
     def cautions(
-        self, parameter: float, result: float, source: Distribution, target: Distribution
-    ) -> list[str]:
+        self, parameter: Array, result: Array, source: Distribution, target: Distribution
+    ) -> dict[str, Mask]:
         """Say where the best fit is the end of the target's range."""
         limits = target.parameter
-        if limits.upper_closed and result == limits.upper:
-            return [f"the best fit lies at the end of the legal range of {target.name}"]
-        return []
+        sentence = f"the best fit lies at the end of the legal range of {target.name}"
+        return {sentence: (result == limits.upper) & limits.upper_closed}
 
 
 METHOD = LeastSquares()

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.evaluation import Array
+from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.fitting.metrics import Metric
 
 
@@ -53,7 +53,13 @@ class Method(ABC):
         return ""
 
     def cautions(
-        self, parameter: float, result: float, source: Distribution, target: Distribution
-    ) -> list[str]:
-        """Return what a careful user must know about one conversion, beyond its error."""
-        return []
+        self, parameter: Array, result: Array, source: Distribution, target: Distribution
+    ) -> dict[str, Mask]:
+        """Return what a careful user must know of conversions, beyond their error.
+
+        Returns
+        -------
+        dict of str to numpy.ndarray of bool
+            From sentences to which of the conversions they are true of.
+        """
+        return {}

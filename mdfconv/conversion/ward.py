@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mdfconv.conversion.equivalence import Formula
 from mdfconv.conversion.formulas import FormulaMethod
+from mdfconv.distributions.equivalence import Formula
 from mdfconv.fitting.metrics import Metric
 
 

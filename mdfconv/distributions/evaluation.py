@@ -20,6 +20,7 @@ from mdfconv.errors import MdfconvError
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 Indices: TypeAlias = NDArray[np.integer[Any]]
+Mask: TypeAlias = NDArray[np.bool_]
 Kernel: TypeAlias = Callable[..., Any]
 
 # Large enough to hide the cost of a call, small enough for the intermediates to stay in cache.

@@ -1,9 +1,11 @@
 """Least squares between two distributions, batched over a sweep.
 
-The squared distance under a metric is minimized over ln p, p the target's parameter: a scan over
-the legal range finds the neighbourhoods of the lowest minima, the zero of the analytic slope in
-each is found between candidates, and the lowest of them is the fit unless the distance falls
-lower still towards an open end of the range. All problems of a batch advance together.
+Where there is a stored fit, two Gauss-Newton steps from there on a few nodes are the answer.
+Elsewhere the squared distance under a metric is minimized over ln p, p the target's parameter: a
+scan over the legal range finds the neighbourhoods of the lowest minima, the zero of the analytic
+slope in each is found between candidates, and the lowest of them is the fit unless the distance
+falls lower still towards an open end of the range. Many values start from the fits of a few. All
+problems of a batch advance together.
 """
 
 from __future__ import annotations
@@ -14,15 +16,24 @@ import numpy as np
 
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Indices
+from mdfconv.fitting.maps import StoredFit
 from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.metrics.base import scaled
-from mdfconv.fitting.problem import Problem
+from mdfconv.fitting.problem import Problem, near_problem
 from mdfconv.fitting.quadrature import Quadrature
 from mdfconv.fitting.refine import refine
 from mdfconv.fitting.scan import lowest_minima, scan
 
-# The intermediates of a scan, 76 candidates × 250 angles a row, stay in the cache.
-_ROWS_AT_ONCE = 32
+# The intermediates of a scan, 76 candidates × 250 angles a row, stay in the cache, and those of a
+# warm start, 68 angles a row.
+_ROWS_AT_ONCE, _WARM_ROWS = 32, 256
+# A stored fit is within 1e-6 in ln p (display: 1e-4): a step beyond leaves the neighbourhood.
+_LARGEST_STEP, _MOST_LEFT = 1e-3, 0.9
+# With more values than knots, those between knots start from a curve through the knots' fits. What
+# ends far above their distances has missed the lowest minimum.
+_KNOTS, _LEAST_KNOTS, _DESCENTS, _AS_USUAL = 64, 4, 1, 1.05
+# From the hemisphere to samples of a part of it a fit moves by some per cent, from a few of them to
+# all by some per mille.
+_DESCENTS_ON_FEW, _LARGEST_FROM_FEW = 3, 1e-2
 # Of the ends of a plateau, between which all lobes are clipped as a whole, the last.
 _AS_LOW = 1 + 1e-9
 # The coarse distance at an end of the scan is right to a per cent or so.
@@ -73,22 +84,156 @@ def fit(
     Fit
         The global minimum of each problem.
     """
-    best, distance = np.full(parameter.size, np.nan), np.full(parameter.size, np.inf)
+    best, distance = np.full((2, parameter.size), np.nan)
+    stored = StoredFit(source, target, metric)
+    if quadrature is not None:
+        if stored.known:
+            best, distance = _on_samples(source, parameter, target, metric, quadrature, stored)
+        if np.isnan(best).any():
+            return cold_fit(source, parameter, target, metric, quadrature)
+        return _with_limits(best, distance, target)
+    if stored.known:
+        with np.errstate(all="ignore"):
+            start = stored(parameter)
+        there = np.flatnonzero(target.parameter.accepts(start))
+        for part in _batches(there.size, _WARM_ROWS):
+            rows = there[part]
+            near, distance[rows] = _warm(source, parameter[rows], target, metric, start[rows])
+            best[rows] = start[rows] if stored.exact else near
+    for search in (_between_knots, cold_fit):
+        rest = np.flatnonzero(np.isnan(best))
+        if rest.size > (_KNOTS if search is _between_knots else 0):
+            found = search(source, parameter[rest], target, metric)
+            best[rest], distance[rest] = found.parameter, found.distance
+    return _with_limits(best, distance, target)
+
+
+def cold_fit(
+    source: Distribution,
+    parameter: Array,
+    target: Distribution,
+    metric: Metric,
+    quadrature: Quadrature | None = None,
+) -> Fit:
+    """Fit without knowing where the minimum is: as `fit`, which it checks."""
+    best, distance = np.full((2, parameter.size), np.nan)
+    tangent = source.half_tangent(parameter) if metric.similar_below else np.ones(parameter.size)
+    similar = tangent < metric.similar_below
+    fitted = parameter.copy()
+    fitted[similar] = source.from_half_tangent(metric.similar_below)
+    for rows in _batches(parameter.size, _ROWS_AT_ONCE):
+        problem = Problem(source, fitted, target, metric, quadrature, rows)
+        best[rows], distance[rows] = _minimum(problem)
+    if similar.any():
+        scale = tangent[similar] / metric.similar_below
+        best[similar] = target.from_half_tangent(target.half_tangent(best[similar]) * scale)
+    return _with_limits(best, distance, target)
+
+
+def _with_limits(best: Array, distance: Array, target: Distribution) -> Fit:
     limits = target.parameter
-    ratio = metric.ratio(source, target) if quadrature is None else None
-    for rows in _batches(parameter.size):
-        problem = Problem(source, parameter, target, metric, quadrature, rows)
-        if ratio is None:
-            best[rows], distance[rows] = _minimum(problem)
-        else:
-            best[rows] = scaled(parameter[rows], ratio, target)
-            distance[rows], _ = problem.distance(np.log(best[rows]), np.arange(rows.size))
     return Fit(best, distance, (best == limits.upper) & limits.upper_closed)
 
 
-def _batches(size: int) -> list[Indices]:
-    starts = range(0, size, _ROWS_AT_ONCE)
-    return [np.arange(start, min(start + _ROWS_AT_ONCE, size)) for start in starts]
+def _warm(
+    source: Distribution, parameter: Array, target: Distribution, metric: Metric, start: Array
+) -> tuple[Array, Array]:
+    """Return the fits near others, and their distances; NaN where there is none."""
+    with np.errstate(all="ignore"):
+        problem = near_problem(source, parameter, target, start, metric)
+        best, distance = descend(problem, start)
+        step = np.log(best / start)
+    stays = (np.abs(step) <= _LARGEST_STEP) & target.parameter.accepts(best)
+    return np.where(stays, best, np.nan), distance
+
+
+def _on_samples(
+    source: Distribution,
+    parameter: Array,
+    target: Distribution,
+    metric: Metric,
+    quadrature: Quadrature,
+    stored: StoredFit,
+) -> tuple[Array, Array]:
+    """Return the fits on given samples, from those over the hemisphere by way of a few samples."""
+    with np.errstate(all="ignore"):
+        near = stored(parameter)
+        if not target.parameter.accepts(near).all():
+            return np.full_like(near, np.nan), near
+        few = near_problem(source, parameter, target, near, metric, _Few(quadrature))
+        for _ in range(_DESCENTS_ON_FEW):
+            near, _ = descend(few, near)
+        if not target.parameter.accepts(near).all():
+            return np.full_like(near, np.nan), near
+        problem = near_problem(source, parameter, target, near, metric, quadrature)
+        best, distance = descend(problem, near)
+        stays = np.abs(np.log(best / near)) <= _LARGEST_FROM_FEW
+    return np.where(stays & target.parameter.accepts(best), best, np.nan), distance
+
+
+class _Few:
+    """The coarse samples of a quadrature."""
+
+    def __init__(self, quadrature: Quadrature) -> None:
+        self._quadrature = quadrature
+
+    def nodes(
+        self, rows: Indices, kinks: Array | None = None, edges: Array | None = None
+    ) -> tuple[Array, Array]:
+        return self._quadrature.coarse(rows)
+
+    def coarse(self, rows: Indices, *, fine: bool = False) -> tuple[Array, Array]:
+        return self._quadrature.coarse(rows)
+
+
+def _between_knots(
+    source: Distribution, parameter: Array, target: Distribution, metric: Metric
+) -> Fit:
+    """Fit many values from fits of a few between which they lie; NaN where that leads astray.
+
+    It does where the lowest minimum changes from one to another, or the fit runs into a limit.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    best, distance = np.full((2, parameter.size), np.nan)
+    x = np.log(parameter)
+    knots = np.linspace(x.min(), x.max(), _KNOTS)
+    fits = cold_fit(source, np.exp(knots), target, metric)
+    known = ~np.isnan(fits.parameter) & (np.diff(knots, prepend=-np.inf) > 0)
+    if np.count_nonzero(known) < _LEAST_KNOTS:
+        return _with_limits(best, distance, target)
+    curve = PchipInterpolator(knots[known], np.log(fits.parameter[known]), extrapolate=False)
+    start = np.exp(curve(x))
+    there = np.flatnonzero(target.parameter.accepts(start))
+    for part in _batches(there.size, _WARM_ROWS):
+        rows = there[part]
+        near = start[rows]
+        for _ in range(_DESCENTS):
+            with np.errstate(all="ignore"):
+                problem = near_problem(source, parameter[rows], target, near, metric)
+                nearer, _ = descend(problem, near)
+            near = np.where(target.parameter.accepts(nearer), nearer, near)
+        best[rows], distance[rows] = _warm(source, parameter[rows], target, metric, near)
+    usual = np.interp(x, knots[known], fits.distance[known])
+    astray = ~(distance <= _AS_USUAL * usual)
+    return _with_limits(np.where(astray, np.nan, best), distance, target)
+
+
+def descend(problem: Problem, start: Array) -> tuple[Array, Array]:
+    """Return the minima near parameters that nearly are, and the distances there.
+
+    A Gauss-Newton step leaves a constant share of the error, a large one where lobes are clipped:
+    two of them say where all would lead (Aitken 1926).
+    """
+    first, _ = problem.step(np.log(start))
+    second, distance = problem.step(np.log(start) + first)
+    left = np.clip(second / first, -_MOST_LEFT, _MOST_LEFT)
+    moved = first + second / (1 - np.where(np.isfinite(left), left, 0))
+    return start * np.exp(moved), distance
+
+
+def _batches(size: int, rows: int) -> list[Indices]:
+    return [np.arange(start, min(start + rows, size)) for start in range(0, size, rows)]
 
 
 def _minimum(problem: Problem) -> tuple[Array, Array]:

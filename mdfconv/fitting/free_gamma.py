@@ -5,19 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import least_squares
 
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.evaluation import Array, Indices
+from mdfconv.distributions.evaluation import Array, Indices, Mask
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.fit import fit
+from mdfconv.fitting.fit import descend
 from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.problem import near_problem
 from mdfconv.fitting.quadrature import Quadrature
+from mdfconv.fitting.scan import candidates
 
 # The distance left by the best first parameter has one minimum over γ, and is smooth: 13 values
-# over the range bracket it.
+# over the range lie near enough.
 _SCANNED = 13
-_TOLERANCE = 1e-8  # in ln γ
+# Kinks stay where they were while both parameters are found: the next pass puts them right.
+_PASSES = 3
+_TOLERANCE = 1e-13
 # Nearer than this share to an end of the range, γ is at the end.
 _AT_END = 1e-3
 
@@ -40,7 +44,7 @@ class FreeFit:
     parameter: Array
     gamma: Array
     distance: Array
-    at_limit: Array
+    at_limit: Mask
 
 
 def fit_free_gamma(
@@ -52,8 +56,7 @@ def fit_free_gamma(
 ) -> FreeFit:
     """Fit both parameters of the target to the source, for each of a batch.
 
-    γ is looked for in `Parameter.fit_range`, by a bounded search on the distance that the best
-    first parameter leaves.
+    Both are looked for together from the lowest of a grid, γ in `Parameter.fit_range`.
 
     Parameters
     ----------
@@ -68,53 +71,81 @@ def fit_free_gamma(
     shape = target.second_parameter
     if shape is None:
         raise MdfconvError(f"{target.name} has one parameter and no γ")
-    low, high = np.log(shape.fit_range).tolist()
-    scanned = np.linspace(low, high, _SCANNED)
-    coarse = np.stack(
-        [
-            fit(source, parameter, target.with_gamma(float(gamma)), metric, quadrature).distance
-            for gamma in np.exp(scanned)
+    start = _start(source, parameter, target, metric, quadrature)
+    rows = [
+        _fit_row(source, parameter[[row]], target, metric, _row_of(quadrature, row), start[row])
+        for row in range(parameter.size)
+    ]
+    best, gamma, distance = np.array(rows).reshape(-1, 3).T
+    return FreeFit(best, gamma, distance, np.isin(gamma, shape.fit_range))
+
+
+def _start(
+    source: Distribution,
+    parameter: Array,
+    target: Distribution,
+    metric: Metric,
+    quadrature: Quadrature | None,
+) -> Array:
+    """Return ln p and ln γ of the lowest of many candidates, shape (n, 2), inside the bounds."""
+    rows = np.arange(parameter.size)
+    lowest, start = np.full(parameter.size, np.inf), np.zeros((parameter.size, 2))
+    low, high = np.log(target.parameters[1].fit_range)
+    for log_gamma in np.linspace(low, high, _SCANNED):
+        shaped = target.with_gamma(float(np.exp(log_gamma)))
+        width = shaped.from_half_tangent(source.half_tangent(parameter))
+        problem = near_problem(source, parameter, shaped, width, metric, quadrature)
+        with np.errstate(all="ignore"):
+            every = candidates(problem)
+            distance = problem.coarse_distance(every)
+        column = np.nanargmin(distance, axis=1)
+        lower = distance[rows, column] < lowest
+        lowest[lower] = distance[rows, column][lower]
+        start[lower] = np.stack([np.log(every[rows, column]), np.full(rows.size, log_gamma)], 1)[
+            lower
         ]
-    )
-    rows = range(parameter.size)
-    fits = np.array(
-        [
-            _fit_row(_Row(source, parameter, target, metric, quadrature, row), scanned, coarse)
-            for row in rows
-        ]
-    )
-    best, log_gamma, distance = fits.reshape(-1, 3).T
-    at_low, at_high = log_gamma - low < _AT_END, high - log_gamma < _AT_END
-    gamma = np.where(at_low, shape.fit_range[0], np.exp(log_gamma))
-    gamma = np.where(at_high, shape.fit_range[1], gamma)
-    return FreeFit(best, gamma, distance, at_low | at_high)
+    start[:, 0] = np.minimum(start[:, 0], np.log(target.parameter.upper) - _AT_END)
+    start[:, 1] = np.clip(start[:, 1], low + _AT_END, high - _AT_END)
+    return start
 
 
-class _Row:
-    """One problem of a batch, as a function of ln γ."""
+def _fit_row(
+    source: Distribution,
+    parameter: Array,
+    target: Distribution,
+    metric: Metric,
+    quadrature: Quadrature | None,
+    x: Array,
+) -> tuple[float, float, float]:
+    """Return the first parameter, γ and the distance of the best fit of one problem."""
+    fit_range = target.parameters[1].fit_range
+    low, high = np.log(fit_range).tolist()
+    for _ in range(_PASSES):
+        near = target.with_gamma(float(np.exp(x[1])))
+        problem = near_problem(source, parameter, near, np.exp(x[:1]), metric, quadrature)
+        residual = problem.residual(np.exp(x[:1]))
+        found = least_squares(
+            lambda at, residual=residual: residual(
+                target.with_gamma(float(np.exp(at[1]))), float(np.exp(at[0]))
+            ),
+            x,
+            bounds=([-np.inf, low], [np.log(target.parameter.upper), high]),
+            xtol=_TOLERANCE,
+            ftol=_TOLERANCE,
+            gtol=_TOLERANCE,
+        )
+        x = found.x
+    for end, log_end in zip(fit_range, (low, high), strict=True):
+        if abs(x[1] - log_end) < _AT_END:
+            near = target.with_gamma(end)
+            problem = near_problem(source, parameter, near, np.exp(x[:1]), metric, quadrature)
+            best, distance = descend(problem, np.exp(x[:1]))
+            return float(best[0]), end, float(distance[0])
+    return float(np.exp(x[0])), float(np.exp(x[1])), 2 * float(found.cost)
 
-    def __init__(
-        self,
-        source: Distribution,
-        parameter: Array,
-        target: Distribution,
-        metric: Metric,
-        quadrature: Quadrature | None,
-        row: int,
-    ) -> None:
-        self.row = row
-        self._source, self._target, self._metric = source, target, metric
-        self._parameter = parameter[row : row + 1]
-        self._quadrature = None if quadrature is None else _OneRow(quadrature, row)
 
-    def best(self, log_gamma: float) -> tuple[float, float]:
-        """Return the distance and the first parameter of the best fit for a γ."""
-        target = self._target.with_gamma(float(np.exp(log_gamma)))
-        one = fit(self._source, self._parameter, target, self._metric, self._quadrature)
-        return float(one.distance[0]), float(one.parameter[0])
-
-    def distance(self, log_gamma: float) -> float:
-        return self.best(log_gamma)[0]
+def _row_of(quadrature: Quadrature | None, row: int) -> Quadrature | None:
+    return None if quadrature is None else _OneRow(quadrature, row)
 
 
 class _OneRow:
@@ -123,20 +154,10 @@ class _OneRow:
     def __init__(self, quadrature: Quadrature, row: int) -> None:
         self._quadrature, self._row = quadrature, np.array([row])
 
-    def nodes(self, rows: Indices, breaks: Array | None = None) -> tuple[Array, Array]:
-        return self._quadrature.nodes(self._row, breaks)
+    def nodes(
+        self, rows: Indices, kinks: Array | None = None, edges: Array | None = None
+    ) -> tuple[Array, Array]:
+        return self._quadrature.nodes(self._row, kinks, edges)
 
     def coarse(self, rows: Indices, *, fine: bool = False) -> tuple[Array, Array]:
         return self._quadrature.coarse(self._row, fine=fine)
-
-
-def _fit_row(problem: _Row, scanned: Array, coarse: Array) -> tuple[float, float, float]:
-    """Return the first parameter, ln γ and the distance of the best fit of one problem."""
-    lowest = int(np.argmin(coarse[:, problem.row]))
-    ends = scanned[np.clip([lowest - 1, lowest + 1], 0, scanned.size - 1)]
-    inside = minimize_scalar(
-        problem.distance, bounds=ends, method="bounded", options={"xatol": _TOLERANCE}
-    )
-    log_gamma = float(min((*ends, inside.x), key=problem.distance))
-    distance, best = problem.best(log_gamma)
-    return best, log_gamma, distance

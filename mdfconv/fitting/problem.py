@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.fitting.level import level_crossing
 from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.quadrature import Quadrature
+from mdfconv.fitting.quadrature import Quadrature, SmoothQuadrature
 
-# An encoding for a screen rises like a root where a distribution leaves 0: panels that shrink
-# by 4 towards the edge resolve it to 1e-6 of the lobe.
-_TOWARDS_EDGE = 1 - np.append(0.25 ** np.arange(1, 10), 0)
+# Angles of kinks, and of the edge.
+_Breaks: TypeAlias = tuple[Array | None, Array | None]
+
 # Beyond this tan β_half (87°), or without a β_half, a lobe is as wide as the hemisphere.
 _WIDEST_TANGENT = 20.0
 
@@ -61,10 +64,11 @@ class Problem:
         else:
             self._quadrature, self._rows = quadrature, rows
         self._source_breaks = self._breaks(source, self._source_parameter, self._peak)
+        self._moving = bool(metric.kinks) or target.edge(np.ones(1)) is not None
         # Unless the panels move with the target, all distances share their samples.
         self._samples: tuple[Array, Array, Array] | None = None
-        if target.edge(np.ones(1)) is None and not metric.kinks:
-            self._samples = self._sampled(np.arange(rows.size), self._source_breaks)
+        if not self._moving:
+            self._samples = self._sampled(np.arange(rows.size), *self._source_breaks)
 
     @property
     def size(self) -> int:
@@ -95,6 +99,43 @@ class Problem:
         weighted = weight * value
         return np.einsum("ij,ij->i", weighted, value), np.einsum("ij,ij->i", weighted, slope)
 
+    def step(self, log_parameter: Array) -> tuple[Array, Array]:
+        """Return the Gauss-Newton step in ln p from near a minimum, and the distance there.
+
+        Parameters
+        ----------
+        log_parameter : numpy.ndarray, shape (m,)
+            Those of the target.
+        """
+        parameter = np.exp(log_parameter)[:, None]
+        beta, weight, signal = self._samples_for(parameter, np.arange(self.size))
+        value, slope = self.metric.signal_and_slope(self.target, beta, parameter, self._peak)
+        value -= signal
+        weighted = weight * slope
+        curvature = np.einsum("ij,ij->i", weighted, slope)
+        step = -np.einsum("ij,ij->i", weighted, value) / curvature
+        # The distance at the end of the step, to second order.
+        distance = np.einsum("ij,ij,ij->i", weight, value, value) - np.square(step) * curvature
+        return step, distance
+
+    def residual(self, parameter: Array) -> Callable[[Distribution, float], Array]:
+        """Return √w ΔS as a function of a target and its parameter, on samples that stay.
+
+        Parameters
+        ----------
+        parameter : numpy.ndarray, shape (1,)
+            That of the target for which the samples are placed, in a batch of one.
+        """
+        beta, weight, signal = self._samples_for(parameter[:, None], np.zeros(1, int))
+        root = np.sqrt(weight[0])
+
+        def residual(target: Distribution, parameter: float) -> Array:
+            value = self.metric.signal(target, beta, np.array([[parameter]]), self._peak)
+            difference: Array = root * (value[0] - signal[0])
+            return difference
+
+        return residual
+
     def relative_error(self, parameter: Array) -> tuple[Array, Array]:
         """Return √(distance / distance of the source from 0), and max |ΔS| / max |S|.
 
@@ -112,7 +153,7 @@ class Problem:
         beta, weight, signal = self._samples_for(parameter[:, None], index)
         difference = self.metric.signal(self.target, beta, parameter[:, None], self._peak)
         difference -= signal
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             share = np.sqrt(
                 np.einsum("ij,ij,ij->i", weight, difference, difference)
                 / np.einsum("ij,ij,ij->i", weight, signal, signal)
@@ -125,20 +166,22 @@ class Problem:
         if self._samples is not None:
             beta, weight, signal = (array[index] for array in self._samples)
             return beta, weight, signal
-        breaks = self._breaks(self.target, parameter, self._peak[index])
-        return self._sampled(index, np.concatenate([self._source_breaks[index], breaks], axis=1))
+        theirs = (part if part is None else part[index] for part in self._source_breaks)
+        ours = self._breaks(self.target, parameter, self._peak[index])
+        return self._sampled(index, *map(_joined, theirs, ours))
 
-    def _sampled(self, index: Indices, breaks: Array) -> tuple[Array, Array, Array]:
+    def _sampled(
+        self, index: Indices, kinks: Array | None, edges: Array | None
+    ) -> tuple[Array, Array, Array]:
         """Return angles, weights and the source's signal."""
-        beta, weight = self._quadrature.nodes(self._rows[index], breaks)
+        beta, weight = self._quadrature.nodes(self._rows[index], kinks, edges)
         parameter = self._source_parameter[index]
         signal = self.metric.signal(self._source, beta, parameter, self._peak[index])
         return beta, weight * self.metric.weight(beta), signal
 
-    def _breaks(self, distribution: Distribution, parameter: Array, peak: Array) -> Array:
-        """Return the angles where the signal is not smooth, shape (n, any); 0 for none."""
-        edge = distribution.edge(parameter)
-        breaks = [np.zeros_like(parameter) if edge is None else edge * _TOWARDS_EDGE]
+    def _breaks(self, distribution: Distribution, parameter: Array, peak: Array) -> _Breaks:
+        """Return the angles of kinks and of the edge, shapes (n, any); None for neither."""
+        kinks = []
         maximum = distribution.maximum(parameter, normalized=self.metric.normalized)
         mode = distribution.mode(parameter)
         for kink in self.metric.kinks:
@@ -146,8 +189,35 @@ class Problem:
             ends = [(mode, np.full_like(mode, 0.5 * np.pi))]
             if np.any(mode > 0):
                 ends.append((mode, np.zeros_like(mode)))
-            breaks += [level_crossing(distribution, parameter, level, *end) for end in ends]
-        return np.concatenate(breaks, axis=1)
+            kinks += [level_crossing(distribution, parameter, level, *end) for end in ends]
+        return np.concatenate(kinks, axis=1) if kinks else None, distribution.edge(parameter)
+
+
+def _joined(one: Array | None, other: Array | None) -> Array | None:
+    parts = [part for part in (one, other) if part is not None]
+    return np.concatenate(parts, axis=1) if parts else None
+
+
+def near_problem(
+    source: Distribution,
+    parameter: Array,
+    target: Distribution,
+    near: Array,
+    metric: Metric,
+    quadrature: Quadrature | None = None,
+) -> Problem:
+    """Return a batch of n fits whose answers are known to be near: a few angles are enough.
+
+    Parameters
+    ----------
+    near : numpy.ndarray, shape (n,)
+        Parameters of the target near the answers.
+    source, parameter, target, metric, quadrature
+        As for `Problem`.
+    """
+    if quadrature is None and metric.over_angles:
+        quadrature = SmoothQuadrature(narrowest(source, parameter, target, near))
+    return Problem(source, parameter, target, metric, quadrature, np.arange(parameter.size))
 
 
 def narrowest(source: Distribution, parameter: Array, target: Distribution, result: Array) -> Array:

@@ -40,15 +40,15 @@ def scan(problem: Problem) -> tuple[Array, Array]:
     candidates, distance : numpy.ndarray, shape (n, c)
         The parameters rise along a row.
     """
-    candidates = _candidates(problem)
-    distance = problem.coarse_distance(candidates)
+    every = candidates(problem)
+    distance = problem.coarse_distance(every)
     if max(problem.metric.kinks, default=1.0) >= 1:
-        return candidates, distance
-    closer = _closer(candidates, lowest_minima(distance))
-    candidates = np.concatenate([candidates, closer], axis=1)
+        return every, distance
+    closer = _closer(every, lowest_minima(distance))
+    every = np.concatenate([every, closer], axis=1)
     distance = np.concatenate([distance, problem.coarse_distance(closer)], axis=1)
-    order = np.argsort(candidates, axis=1, kind="stable")
-    return np.take_along_axis(candidates, order, 1), np.take_along_axis(distance, order, 1)
+    order = np.argsort(every, axis=1, kind="stable")
+    return np.take_along_axis(every, order, 1), np.take_along_axis(distance, order, 1)
 
 
 def lowest_minima(distance: Array) -> Indices:
@@ -78,7 +78,7 @@ def _closer(candidates: Array, columns: Indices) -> Array:
     return np.exp(ends[0] + (ends[1] - ends[0]) * share).reshape(len(candidates), -1)
 
 
-def _candidates(problem: Problem) -> Array:
+def candidates(problem: Problem) -> Array:
     """Return target parameters over the whole legal range, ascending, shape (n, c)."""
     target = problem.target
     count = _MULTIPLES_WITH_KINKS if problem.metric.kinks else _MULTIPLES
@@ -94,5 +94,4 @@ def _candidates(problem: Problem) -> Array:
         wider = upper - (upper - widest) * _CLOSER
     missing = np.isnan(scaled)
     beyond = widest * _BEYOND ** (np.cumsum(missing, axis=1) * (-1 if falls else 1))
-    candidates = np.concatenate([np.where(missing, beyond, scaled), wider], axis=1)
-    return np.sort(candidates, axis=1)
+    return np.sort(np.concatenate([np.where(missing, beyond, scaled), wider], axis=1), axis=1)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from mdfconv.benchmark.methods import answers, as_wide, covering
-from mdfconv.conversion.equivalence import exact_route
 from mdfconv.conversion.method import Method
 from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions import Distribution, one_parameter_distributions
+from mdfconv.distributions.equivalence import exact_route
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.output.files import file_bytes

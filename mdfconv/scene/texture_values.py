@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mdfconv.conversion.equivalence import exact_route, follow
 from mdfconv.conversion.methods import default_method, method_named
 from mdfconv.conversion.refusals import check_covered
+from mdfconv.distributions.equivalence import exact_route, follow
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import metric_named

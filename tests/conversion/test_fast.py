@@ -2,7 +2,6 @@
 
 import itertools
 import warnings
-from pathlib import Path
 
 import dask.array
 import numpy as np
@@ -11,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mdfconv
-from mdfconv.conversion import fast
-from mdfconv.fitting.fit import fit
+from mdfconv.fitting import maps
+from mdfconv.fitting.fit import cold_fit
 from mdfconv.fitting.metrics import list_metrics, metric_named
 from tests import generate_fast
 from tests.cli.runner import run
@@ -34,7 +33,7 @@ def test_fast_is_the_fit(source, target, kept):
         warnings.simplefilter("ignore", mdfconv.MdfconvWarning)
         got = mdfconv.convert(values, source, target, "fast", metric=kept)
     sides = mdfconv.distribution(source), mdfconv.distribution(target)
-    exact = fit(sides[0], values, sides[1], metric_named(kept)).parameter
+    exact = cold_fit(sides[0], values, sides[1], metric_named(kept)).parameter
     answered = np.isfinite(got)
     assert got[answered] == pytest.approx(exact[answered], rel=LIMIT[kept])
     # What is left out are sources rougher than any Sawicki lobe that anyone would use.
@@ -124,7 +123,7 @@ def test_dask_arrays_stay_lazy():
 
 @pytest.mark.parametrize("key", ["unit blinn-phong ggx", "energy ggx beckmann"])
 def test_the_data_are_what_the_script_makes(key):
-    stored = fast.load()[key]
+    stored = maps.load()[key]
     _, made, _ = generate_fast.make(key)
     assert made.edges == pytest.approx(stored.edges, rel=1e-9)
     x = np.linspace(1e-6, stored.edges[-1], 500)
@@ -132,4 +131,4 @@ def test_the_data_are_what_the_script_makes(key):
 
 
 def test_the_data_are_small():
-    assert Path(generate_fast.FILE).stat().st_size < 200_000
+    assert maps.FILE.stat().st_size < 200_000

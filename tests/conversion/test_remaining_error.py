@@ -7,9 +7,9 @@ import pytest
 
 import mdfconv
 from mdfconv.benchmark.methods import answers, covering
-from mdfconv.conversion.equivalence import exact_route
 from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions import one_parameter_distributions
+from mdfconv.distributions.equivalence import exact_route
 from mdfconv.fitting.metrics import list_metrics, metric_named
 from tests.fitting.brute_force import Problem
 

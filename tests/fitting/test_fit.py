@@ -8,7 +8,8 @@ import pytest
 
 import mdfconv
 from mdfconv.distributions import one_parameter_distributions
-from mdfconv.fitting.fit import fit
+from mdfconv.fitting import maps
+from mdfconv.fitting.fit import cold_fit, fit
 from mdfconv.fitting.free_gamma import fit_free_gamma
 from mdfconv.fitting.metrics import list_metrics, metric_named
 from mdfconv.fitting.metrics.display import Display
@@ -76,6 +77,49 @@ def test_limits_for_smooth_surfaces(measure, ratio):
     smooth = np.array([1e-8, 1e-6, 1e-4])
     found = fit(mdfconv.distribution("beckmann"), smooth, mdfconv.distribution("ggx"), measure)
     np.testing.assert_allclose(found.parameter / smooth, ratio, atol=5e-4)
+
+
+@pytest.mark.parametrize("kept", list_metrics())
+@pytest.mark.parametrize(("source", "target"), list(itertools.permutations(NAMES, 2)))
+def test_a_warm_start_finds_what_a_cold_one_finds(source, target, kept):
+    ends = [mdfconv.distribution(name) for name in (source, target)]
+    values = ends[0].from_half_tangent(np.append(np.geomspace(1e-6, 0.3, 4), [0.7, 1.2]))
+    problem = ends[0], values[~np.isnan(values)], ends[1], metric_named(kept)
+    warm, cold = fit(*problem), cold_fit(*problem)
+    tolerance = 1e-6 if kept == "display" else 3e-7
+    np.testing.assert_array_equal(warm.at_limit, cold.at_limit)
+    assert warm.parameter == pytest.approx(cold.parameter, rel=tolerance, nan_ok=True)
+    there = ~np.isnan(cold.parameter)
+    assert warm.distance[there] == pytest.approx(cold.distance[there], rel=1e-4, abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "kept"),
+    [
+        ("beckmann", "ggx", "display:4"),
+        ("ggx", "gauss", "display:0.5"),
+        ("ggx", "student-t", "energy"),
+        ("ggx", "gtr", "unit"),
+    ],
+)
+def test_many_values_are_what_each_is_alone(source, target, kept):
+    """Without a stored fit many values start from a few; some have none, some are equal."""
+    target = mdfconv.distribution(target)
+    target = target.with_gamma(3.3) if target.second_parameter else target
+    values = np.random.default_rng(3).permutation(np.geomspace(1e-3, 0.999, 150))
+    values = np.append(values, [values[0], 0.9999])
+    problem = mdfconv.distribution(source), values, target, metric_named(kept)
+    many, cold = fit(*problem).parameter, cold_fit(*problem).parameter
+    assert many == pytest.approx(cold, rel=1e-6, nan_ok=True)
+
+
+def test_a_start_that_is_far_off_is_not_believed(monkeypatch):
+    ends = mdfconv.distribution("beckmann"), mdfconv.distribution("ggx")
+    values = np.array([0.05, 0.3])
+    wanted = cold_fit(ends[0], values, ends[1], Energy()).parameter
+    astray = maps.StoredFit.__call__
+    monkeypatch.setattr(maps.StoredFit, "__call__", lambda self, p: 1.3 * astray(self, p))
+    np.testing.assert_allclose(fit(ends[0], values, ends[1], Energy()).parameter, wanted, rtol=1e-9)
 
 
 def test_best_fits_at_the_end_of_the_range():

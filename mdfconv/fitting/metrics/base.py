@@ -40,6 +40,9 @@ class Metric(ABC):
         Whether it must.
     over_angles : bool
         Whether S is a function of β.
+    similar_below : float
+        Lobes of a smaller tan β_half convert as one that has it, scaled: smooth lobes are similar,
+        and rounding would hide what they differ by.
     """
 
     name: ClassVar[str]
@@ -52,6 +55,7 @@ class Metric(ABC):
     setting: ClassVar[str] = ""
     needs_setting: ClassVar[bool] = False
     over_angles: ClassVar[bool] = True
+    similar_below: ClassVar[float] = 0.0
 
     @classmethod
     def with_setting(cls, text: str) -> Self:

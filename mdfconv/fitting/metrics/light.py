@@ -41,6 +41,7 @@ class Light(Metric):
     setting = "environment map"
     needs_setting = True
     over_angles = False
+    similar_below = 1e-7
 
     def __init__(self, spectrum: Spectrum, label: str = "") -> None:
         self.spectrum, self._label = spectrum, label
@@ -53,7 +54,10 @@ class Light(Metric):
         if not text:
             raise MdfconvError("the light metric needs an environment map", "light:FILE")
         path = Path(text)
-        changed = path.stat().st_mtime_ns if path.exists() else 0
+        try:
+            changed = path.stat().st_mtime_ns
+        except (OSError, ValueError):
+            changed = 0  # reading it says what is wrong
         return cls(_spectrum(path, changed), text)
 
     def __str__(self) -> str:
@@ -90,7 +94,9 @@ class _Degrees:
     def __init__(self, degree: Array) -> None:
         self._degree = degree
 
-    def nodes(self, rows: Indices, breaks: Array | None = None) -> tuple[Array, Array]:
+    def nodes(
+        self, rows: Indices, kinks: Array | None = None, edges: Array | None = None
+    ) -> tuple[Array, Array]:
         shape = rows.size, self._degree.size
         return np.broadcast_to(self._degree, shape), np.broadcast_to(1.0, shape)
 

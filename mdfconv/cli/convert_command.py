@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
+from mdfconv.cli.numbers import Block, read_blocks
 from mdfconv.cli.options import (
     ExposureOption,
     Format,
@@ -24,18 +25,22 @@ from mdfconv.cli.options import (
     every_metric,
 )
 from mdfconv.cli.tables import (
+    ROWS_SHOWN,
     console,
     form_of,
     print_table,
     rich_table,
     table_text,
     tell,
+    tell_rest,
     value_text,
 )
 from mdfconv.conversion import Conversion, explain, list_methods
-from mdfconv.conversion.arrays import Gamma
+from mdfconv.conversion.arrays import FREE, Gamma
 from mdfconv.conversion.endpoint import endpoint
+from mdfconv.conversion.explanation import results_and_cautions
 from mdfconv.distributions import list_distributions, one_parameter_distributions
+from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 
@@ -84,10 +89,13 @@ def command(
 
     seq 0.1 0.1 0.4 | mdfconv convert --from ggx --to beckmann --method half-angle -
     """
-    numbers = _read(values)
     form = form_of(format_, in_pipe=Format.plain)
     rule = _Rule(method, asked_metric(metric, exposure), exposure, chosen_gamma(gamma))
     every = target.strip().lower() == _EVERY
+    if form is Format.plain and not every and rule.gamma != FREE:
+        _stream(read_blocks(values), source, target, rule)
+        return
+    numbers = [number for block in read_blocks(values) for number in block.numbers]
     targets = _targets(numbers, source) if every else [target]
     conversions, refusals = _convert(numbers, source, targets, rule, errors=form != Format.plain)
     if refusals and (not every or not conversions):
@@ -95,7 +103,7 @@ def command(
     for refusal in refusals:
         tell(f"left out: {refusal}")
     if form is Format.plain:
-        _write_plain(conversions, named=every, free=rule.gamma == "free")
+        _write_plain(conversions, named=every, free=rule.gamma == FREE)
     elif form is Format.table:
         _write_tables(conversions, rule)
     else:
@@ -117,10 +125,21 @@ class _Rule:
         options: dict[str, Any] = {"metric": self.metric, "gamma": self.gamma, "errors": errors}
         return explain(values, source, target, self.method, **options)
 
+    def results(self, block: Block, source: str, target: str) -> tuple[list[str], Sequence[str]]:
+        """Return the results of a block as text, and what they call for."""
+        if block.has_pairs:
+            found = self.explain(block.numbers, source, target, errors=False)
+            texts = [text for conversion in found for text in conversion.cautions]
+            return [value_text(conversion.result) for conversion in found], texts
+        options: dict[str, Any] = {"metric": self.metric, "gamma": self.gamma}
+        numbers = np.array(block.numbers, dtype=float)
+        stored, cautions = results_and_cautions(numbers, source, target, self.method, **options)
+        return list(map(number_text, stored.tolist())), cautions
+
     def others(self, chosen: Conversion) -> Iterator[_Rule]:
         """Yield the other methods under the metric of an answer."""
         for method in list_methods():
-            if method.name != chosen.method and (self.gamma != "free" or method.name == "fit"):
+            if method.name != chosen.method and (self.gamma != FREE or method.name == "fit"):
                 yield replace(self, method=method.name, metric=metric_named(chosen.metric))
 
     def under_other_metrics(self, chosen: Conversion) -> Iterator[_Rule]:
@@ -128,47 +147,6 @@ class _Rule:
         for metric in every_metric(self.exposure):
             if str(metric) != chosen.metric:
                 yield replace(self, method=None, metric=metric)
-
-
-def _read(values: list[str]) -> list[Any]:
-    """Return numbers and pairs for the arguments, with standard input in place of ``-``."""
-    if values.count("-") > 1:
-        raise MdfconvError("standard input can be read only once: give one -")
-    numbers: list[Any] = []
-    for position, text in enumerate(values, start=1):
-        if text == "-":
-            numbers += _read_lines()
-        else:
-            where = f"value {position} of {len(values)}: " if len(values) > 1 else ""
-            numbers.append(_number(text, where))
-    return numbers
-
-
-def _read_lines() -> list[Any]:
-    if sys.stdin is None:
-        raise MdfconvError("standard input is closed")
-    try:
-        lines = sys.stdin.read().removeprefix("\ufeff").splitlines()
-    except UnicodeDecodeError:
-        raise MdfconvError("standard input is not text") from None
-    numbers = [
-        _number(line.strip(), f"line {number} of standard input: ")
-        for number, line in enumerate(lines, start=1)
-        if line.strip()
-    ]
-    if not numbers:
-        raise MdfconvError("standard input holds no values")
-    return numbers
-
-
-def _number(text: str, where: str) -> Any:
-    try:
-        parts = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise MdfconvError(f"{where}'{text}' is not a number") from None
-    if len(parts) > 2:
-        raise MdfconvError(f"{where}'{text}' is not a pair X,Y")
-    return parts if len(parts) == 2 else parts[0]
 
 
 def _targets(numbers: list[Any], source: str) -> list[str]:
@@ -198,8 +176,47 @@ def _convert(
 
 def _takes_gamma(source: str, target: str, rule: _Rule) -> bool:
     """Return whether a γ means something for one of many targets."""
-    names = [target] if rule.gamma == "free" else [source, target]
+    names = [target] if rule.gamma == FREE else [source, target]
     return any(endpoint(name).distribution.second_parameter for name in names)
+
+
+def _stream(blocks: Iterator[Block], source: str, target: str, rule: _Rule) -> None:
+    """Convert and write block by block, in the memory of one."""
+    # A mistake in the names is none of a line.
+    rule.results(Block([], []), source, target)
+    told: set[str] = set()
+    for block in blocks:
+        try:
+            lines, cautions = rule.results(block, source, target)
+        except MdfconvError as error:
+            raise _at_its_line(error, block, source, target, rule) from None
+        for caution in dict.fromkeys(cautions):
+            if caution not in told:
+                tell(f"note: {caution}")
+                told.add(caution)
+        typer.echo("\n".join(lines))
+
+
+def _at_its_line(
+    error: MdfconvError, block: Block, source: str, target: str, rule: _Rule
+) -> MdfconvError:
+    """Return the error of the first value that has one, with its line of standard input."""
+    if not block.lines:
+        return error
+    low, high = 0, len(block.numbers)
+    while high - low > 1:
+        middle = (low + high) // 2
+        try:
+            rule.results(Block(block.numbers[low:middle], []), source, target)
+            low = middle
+        except MdfconvError:
+            high = middle
+    try:
+        rule.results(Block(block.numbers[low:high], []), source, target)
+    except MdfconvError as alone:
+        reason = f"line {block.lines[low]} of standard input: {alone.reason}"
+        return MdfconvError(reason, alone.hint)
+    return error
 
 
 def _write_plain(conversions: list[list[Conversion]], *, named: bool, free: bool) -> None:
@@ -221,7 +238,8 @@ def _write_tables(conversions: list[list[Conversion]], rule: _Rule) -> None:
     """Write tables a target: the methods under the metric, and the fits under the others."""
     out = console()
     for group in conversions:
-        print_table(_methods_table(group, rule))
+        print_table(_methods_table(group[:ROWS_SHOWN], rule))
+        tell_rest(len(group))
         for caution in dict.fromkeys(text for conversion in group for text in conversion.cautions):
             out.print(f"Note: {caution}.")
         inexact = [conversion for conversion in group if not conversion.exact]

@@ -22,7 +22,8 @@ def command(
     map_: Annotated[
         Path,
         typer.Argument(
-            metavar="MAP", help="Environment map, 2:1: OpenEXR, Radiance .hdr or another picture."
+            metavar="MAP",
+            help="Environment map, linear, 2:1: OpenEXR, Radiance .hdr or another picture.",
         ),
     ],
     m_b: Annotated[

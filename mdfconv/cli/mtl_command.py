@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli.options import ExposureOption, MetricOption, chosen_metric
-from mdfconv.cli.tables import print_table, progress, rich_table, tell
+from mdfconv.cli.tables import ROWS_SHOWN, print_table, progress, rich_table, tell, tell_rest
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import json_text
 
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.mtl import Material, MtlConversion
     from mdfconv.scene.mtl_files import Destination
-
-# Longer tables are cut on the screen; JSON has every row.
-_ROWS_SHOWN = 100
 
 
 class ReportFormat(StrEnum):
@@ -197,7 +194,7 @@ def _print_table(record: dict[str, Any], rules: list[str]) -> None:
             **{rule: _importer(row[rule]) for rule in rules},
             "notes": "; ".join(row["notes"]),
         }
-        for row in rows[:_ROWS_SHOWN]
+        for row in rows[:ROWS_SHOWN]
     ]
     if shown:
         title = f"{record['file']}, {record['metric']} metric"
@@ -205,8 +202,7 @@ def _print_table(record: dict[str, Any], rules: list[str]) -> None:
         print_table(rich_table(list(shown[0]), shown, title, right=right), err=True)
     else:
         typer.echo(f"{record['file']}: nothing to convert", err=True)
-    if len(rows) > _ROWS_SHOWN:
-        typer.echo(f"… and {len(rows) - _ROWS_SHOWN} more; --format json has them all", err=True)
+    tell_rest(len(rows), "--format json")
     for texture in record["textures"]:
         typer.echo(f"{texture['keyword']} {texture['file']} (line {texture['line']})", err=True)
 

@@ -168,7 +168,7 @@ def asked_metric(name: str | None, exposure: float | None) -> Metric | None:
 
     if name is None and exposure is None:
         return None
-    return chosen_metric(name or list_metrics()[0], exposure)
+    return chosen_metric(list_metrics()[0] if name is None else name, exposure)
 
 
 def every_metric(exposure: float | None = None) -> list[Metric]:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _PIPE_WIDTH = 160
+# Nobody reads more in a terminal, and Rich takes a millisecond a row.
+ROWS_SHOWN = 500
 _WIDEST = 1000
 _ENDINGS = {".json": Format.json, ".md": Format.markdown, ".txt": Format.table}
 
@@ -70,7 +72,8 @@ def write_table(
 
         write_files({output: file_bytes(table_text(columns, rows, form))})
     elif form is Format.table:
-        print_table(rich_table(columns, rows, title, styles))
+        print_table(rich_table(columns, rows[:ROWS_SHOWN], title, styles))
+        tell_rest(len(rows))
     else:
         typer.echo(table_text(columns, rows, form))
 
@@ -130,6 +133,12 @@ def print_table(table: Any, *, err: bool = False) -> None:
     if needed > out.width:
         out = Console(stderr=err, width=needed, highlight=False)
     out.print(table)
+
+
+def tell_rest(count: int, everything: str = "--format csv") -> None:
+    """Say how many rows a table on a terminal leaves out, and what shows them."""
+    if count > ROWS_SHOWN:
+        tell(f"… and {count - ROWS_SHOWN} more; {everything} has them all")
 
 
 def console(*, err: bool = False) -> Console:

@@ -264,11 +264,13 @@ def _facts(formula: Formula, problem: Problem) -> list[str]:
     """Return what a reader of the code must know, in ASCII."""
     source, target = (_ascii(_end_text(end)) for end in (problem.source, problem.target))
     metric = problem.metric
+    # A metric may be named after a file; a comment is one line.
+    named = "".join(letter if letter.isprintable() else "?" for letter in str(metric))
     of = " of 1 - g" if is_glossy(problem.target) else ""
     return [
         f"{source} to {target}, for {number_text(problem.low)} to {number_text(problem.high)}; "
         "outside, the input is clamped.",
-        f"Least squares under the {metric} metric: keeps the {metric.keeps}.",
+        f"Least squares under the {named} metric: keeps the {metric.keeps}.",
         f"Worst relative error{of} {formula.error:.2g} in float32; {formula.shape.operations} "
         "operations (+ - * count 1, clamp 2, / sqrt 1/sqrt 4).",
         f"By mdfconv {__version__}.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 
 # Of linear Rec. 709 (ITU-R BT.709), the primaries of OpenEXR and Radiance files.
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 # A map is often the reduction of a larger one, and the filter that made it has overshot beside
 # its lights: by at most a quarter of what shines within four texels.
 _OVERSHOOT, _FILTER_WIDTH = 0.25, 9
@@ -24,8 +25,8 @@ def read_environment_map(path: str | Path) -> Array:
     Parameters
     ----------
     path : str or Path
-        A picture that OpenImageIO reads, OpenEXR or Radiance .hdr for one; linear. The first row
-        is the zenith.
+        A picture that OpenImageIO reads, OpenEXR or Radiance .hdr for one; taken as linear. The
+        first row is the zenith.
 
     Returns
     -------
@@ -47,30 +48,40 @@ def read_environment_map(path: str | Path) -> Array:
     if not np.isfinite(pixels).all():
         count = int(np.count_nonzero(~np.isfinite(pixels).all(axis=2)))
         raise MdfconvError(f"{path}: {count} of {height * width} texels are NaN or infinite")
-    luminance: Array = pixels @ _LUMINANCE if pixels.shape[2] > 2 else pixels[:, :, 0]
+    colour = pixels.shape[2] > 2
+    luminance: Array = (pixels @ _LUMINANCE if colour else pixels[:, :, 0]).astype(np.float64)
     _check_light(luminance, path)
     return luminance
 
 
 def _read(path: Path) -> Array:
-    """Return the first colour channels of a picture, shape (h, w, 1 to 3), float64."""
+    """Return the first colour channels of a picture, shape (h, w, 1 to 3), float32."""
     import OpenImageIO
 
     # The library opens names with patterns in them, and devices; a file is what it is.
-    if not path.is_file():
+    try:
+        regular = stat.S_ISREG(path.stat().st_mode)
+    except OSError as error:
+        raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
+    except ValueError as error:  # a name with a 0 in it
+        raise MdfconvError(f"cannot read {path}: {error}") from None
+    if not regular:
         raise MdfconvError(f"cannot read {path}: it is not a file")
     source = OpenImageIO.ImageInput.open(str(path))
     if source is None:
         raise MdfconvError(f"cannot read {path}: {_first_line(OpenImageIO.geterror())}")
     try:
-        channels = min(source.spec().nchannels, 3)
+        shape = source.spec()
+        if (shape.width, shape.height) != (shape.full_width, shape.full_height):
+            raise MdfconvError(f"{path}: a part of a larger picture is no environment map")
+        channels = min(shape.nchannels, 3)
         pixels = source.read_image(0, 0, 0, channels, "float")
-        error = source.geterror()
+        fault = source.geterror()
     finally:
         source.close()
-    if pixels is None or error:
-        raise MdfconvError(f"cannot read {path}: {_first_line(error)}")
-    return np.asarray(pixels, dtype=np.float64)
+    if pixels is None or fault:
+        raise MdfconvError(f"cannot read {path}: {_first_line(fault)}")
+    return np.asarray(pixels)
 
 
 def _first_line(text: str) -> str:

@@ -15,7 +15,9 @@ _LEAST_ANGLE = 1e-18
 # grow by 4, with 12 nodes each.
 _WAVES, _GROWTH, _ORDER = 2.0, 4.0, 12
 # Of the Hankel transform: steps in ln β and ln l, and how far beyond π/2 its period reaches.
-_STEP, _BEYOND = 0.05, 1e3
+_STEP, _BEYOND = 0.1, 1e3
+# Towards π/2, where the roughest lobes are, panels shrink by 4.
+_TOWARDS_HORIZON = 1 - 0.25 ** np.arange(4, 18)
 
 
 class LobeSpectrum:
@@ -83,8 +85,8 @@ class LobeSpectrum:
         wave = _WAVES * np.pi / self._highest
         lobe = wave * _GROWTH ** np.arange(np.log(_LEAST_ANGLE / wave) // np.log(_GROWTH), 0)
         even = np.linspace(wave, np.pi / 2, int(np.ceil(np.pi / 2 / wave)) + 1)
-        edges = np.concatenate([[0.0], lobe, even])
-        beta, weight = gauss_panels(edges[None, :], _ORDER)
+        edges = np.concatenate([[0.0], lobe, even, np.pi / 2 * _TOWARDS_HORIZON])
+        beta, weight = gauss_panels(np.sort(edges)[None, :], _ORDER)
         return beta[0], weight[0]
 
     @property

@@ -15,6 +15,9 @@ from mdfconv.light.environment_map import read_environment_map
 _MOST_DEGREES = 255
 # The law is fitted from here on: below, a degree has too few harmonics to be typical.
 FIRST_OF_LAW = 10
+# A law is not steeper than that of a smooth sky, nor does it rise; what is less than this share of
+# the largest power is rounding.
+_SOFTEST, _ROUNDING = 6.0, 1e-12
 # Rows whose Legendre functions are held at a time: 67 MB.
 _ROWS_AT_ONCE = 64
 
@@ -55,11 +58,16 @@ class Spectrum:
     @cached_property
     def _line(self) -> tuple[float, float]:
         """Slope and constant of the line through ln C_l over ln (l + ½)."""
-        degree = np.arange(FIRST_OF_LAW, self.highest + 1)
-        # What is symmetrical has no power in some degrees.
-        degree = degree[self.power[degree] > 0]
-        slope, constant = np.polyfit(np.log(degree + 0.5), np.log(self.power[degree]), 1)
-        return float(slope), float(constant)
+        least = _ROUNDING * self.power[1:].max()
+        degree = np.arange(1, self.highest + 1)
+        # What is symmetrical or smooth has no power in some degrees but that of rounding.
+        degree = degree[self.power[1:] > least]
+        usual = degree[degree >= FIRST_OF_LAW]
+        degree = usual if usual.size > 1 else degree
+        x, y = np.log(degree + 0.5), np.log(self.power[degree])
+        slope = np.polyfit(x, y, 1)[0] if degree.size > 1 else -_SOFTEST
+        slope = float(np.clip(slope, -_SOFTEST, 0))
+        return slope, float(np.mean(y - slope * x))
 
 
 def spectrum_of(luminance: Array) -> Spectrum:
@@ -74,11 +82,9 @@ def spectrum_of(luminance: Array) -> Spectrum:
 
     height, width = luminance.shape
     highest = min(height // 2 - 1, _MOST_DEGREES)
-    edges = np.cos(np.linspace(0, np.pi, height + 1))
-    # What each row has of the sphere, and its Fourier coefficients.
-    rows = (edges[:-1] - edges[1:])[:, None] * np.fft.rfft(luminance, axis=1)[:, : highest + 1]
-    rows *= 2 * np.pi / width
     zenith = np.pi * (np.arange(height) + 0.5) / height
+    rows = _weights(zenith)[:, None] * np.fft.rfft(luminance, axis=1)[:, : highest + 1]
+    rows *= 2 * np.pi / width
     harmonics = np.zeros((highest + 1, highest + 1), complex)
     for start in range(0, height, _ROWS_AT_ONCE):
         part = slice(start, start + _ROWS_AT_ONCE)
@@ -87,6 +93,14 @@ def spectrum_of(luminance: Array) -> Spectrum:
     power = np.square(np.abs(harmonics)).sum(axis=1) * 2 - np.square(np.abs(harmonics[:, 0]))
     power /= 2 * np.arange(highest + 1) + 1
     return Spectrum(power * (4 * np.pi / power[0]))
+
+
+def _weights(zenith: Array) -> Array:
+    """Return the weights of Fejér's first rule, which is exact for harmonics (Fejér 1933)."""
+    order = np.arange(1, zenith.size // 2 + 1)
+    ripple = np.cos(2 * np.outer(zenith, order)) @ (2 / (4 * np.square(order) - 1))
+    weights: Array = 2 / zenith.size * (1 - ripple)
+    return weights
 
 
 def spectrum_of_file(path: str | Path) -> Spectrum:

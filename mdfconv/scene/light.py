@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mdfconv.distributions import distribution
+from mdfconv.errors import MdfconvError
 from mdfconv.fitting.fit import fit
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.fitting.metrics.light import Light
@@ -46,9 +47,10 @@ class LightReport:
     def sentence(self) -> str:
         """What the light is, in words."""
         return (
-            f"C_l falls like l^−{self.spectrum.exponent:.2f} (l from {FIRST_OF_LAW} to "
-            f"{self.spectrum.highest}): {100 * self.softness:.0f} % of the way from a sun "
-            f"({SUN:g}) to an overcast sky ({OVERCAST:g}); nature's 1/f² is 2."
+            f"Fine detail: C_l falls like l^−{self.spectrum.exponent:.2f} (l from {FIRST_OF_LAW} "
+            f"to {self.spectrum.highest}): {100 * self.softness:.0f} % of the way from a sun "
+            f"({SUN:g}) to an overcast sky ({OVERCAST:g}); nature's 1/f² is 2. "
+            "It decides for mirrors; for rougher surfaces the whole spectrum does."
         )
 
     def spectrum_rows(self) -> list[dict[str, Any]]:
@@ -74,15 +76,24 @@ def light_report(path: str | Path, m_b: Sequence[float]) -> LightReport:
     Raises
     ------
     MdfconvError
-        As `read_environment_map`, and if an m_B is illegal.
+        As `read_environment_map`, and if an m_B is illegal or has no best GGX.
     """
     source, target = distribution(SOURCE), distribution(TARGET)
     parameter = np.array([source.parameter.check_one(value, SOURCE) for value in m_b])
     spectrum = spectrum_of_file(path)
-    own = fit(source, parameter, target, Light(spectrum)).parameter
-    columns = {"m_b": parameter, "light": own, "ratio": own / parameter}
-    for name in METRICS:
-        columns[name] = fit(source, parameter, target, metric_named(name)).parameter
+    metrics = {"light": Light(spectrum)} | {name: metric_named(name) for name in METRICS}
+    columns = {"m_b": parameter}
+    for name, metric in metrics.items():
+        with np.errstate(all="ignore"):
+            columns[name] = fit(source, parameter, target, metric).parameter
+        if np.isnan(columns[name]).any():
+            lost = parameter[int(np.argmax(np.isnan(columns[name])))]
+            raise MdfconvError(f"{SOURCE} m_B = {lost:g} has no best {TARGET} under {name}")
+    columns["ratio"] = columns["light"] / parameter
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     softness = float(np.clip((spectrum.exponent - SUN) / (OVERCAST - SUN), 0, 1))
-    return LightReport(spectrum, softness, [dict(zip(columns, row, strict=True)) for row in rows])
+    conversions = [dict(zip(columns, row, strict=True)) for row in rows]
+    shown = "m_b", "light", "ratio", *METRICS
+    return LightReport(
+        spectrum, softness, [{name: row[name] for name in shown} for row in conversions]
+    )

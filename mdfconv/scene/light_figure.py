@@ -34,7 +34,8 @@ def draw_spectrum(spectrum: Spectrum, title: str, dpi: int = 150) -> bytes:
     for exponent, label, dashes in _GUIDES:
         guide = start * (degree / FIRST_OF_LAW) ** -exponent
         panel.plot(degree, guide, color="0.5", linestyle=dashes, linewidth=1, label=label)
-    panel.axvline(spectrum.highest, color="0.7", linewidth=0.8)
+    measured = f"measured to l = {spectrum.highest}"
+    panel.axvline(spectrum.highest, color="0.7", linewidth=0.8, label=measured)
     panel.set(xscale="log", yscale="log", xlabel="degree l", title=title)
     panel.set_ylabel("C_l (4π at l = 0)")
     panel.legend()

@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 
+import numpy as np
 import pytest
 
 import mdfconv
@@ -253,3 +254,44 @@ def test_a_terminal_without_unicode():
     )  # fmt: skip
     assert status == 0
     assert "0.23552" in out
+
+
+def test_standard_input_is_streamed():
+    """Several blocks, and memory that does not grow with them."""
+    values = [f"{0.05 + 1e-7 * number:.9f}" for number in range(300_000)]
+    arguments = "convert", "--from", "beckmann", "--to", "ggx", "-"
+    status, out, err = run(*arguments, stdin="\n".join(values))
+    assert (status, err) == (0, "")
+    lines = out.splitlines()
+    assert len(lines) == len(values)
+    expected = mdfconv.convert(np.array(values[::50_000], dtype=float), "beckmann", "ggx")
+    assert [float(line) for line in lines[::50_000]] == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("rough", "line 250001 of standard input: 'rough' is not a number"),
+        ("-0.1", "line 250001 of standard input: beckmann m_B = -0.1 is outside the legal range"),
+        ("1,2,3", "line 250001 of standard input: '1,2,3' is not a pair"),
+        ("3", "line 250001 of standard input: for beckmann m_B = 3 closed-form gives"),
+    ],
+)
+def test_a_bad_line_far_down_is_named(line, message):
+    text = "0.2\n" * 250_000 + f"{line}\n" + "0.2\n" * 10
+    status, _, err = run("convert", "--from", "beckmann", "--to", "ggx", "-", stdin=text)
+    assert status == 2
+    assert message in err.splitlines()[-1]
+
+
+def test_arguments_and_standard_input_keep_their_order():
+    status, out, _ = run(
+        "convert", "--from", "ashikhmin-shirley", "--to", "ggx", "10,10", "-", "50",
+        stdin="\ufeff20,20\n\n30",
+    )  # fmt: skip
+    assert status == 0
+    alone = [mdfconv.convert(n, "blinn-phong", "ggx") for n in (10.0, 20.0, 30.0, 50.0)]
+    got = [float(line.partition(",")[0]) for line in out.splitlines()]
+    assert got == pytest.approx(alone, rel=1e-9)
+    status, out, _ = run("convert", "--from", "nothing", "--to", "ggx", "-", stdin="x")
+    assert (status, out) == (2, "")

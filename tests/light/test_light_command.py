@@ -5,6 +5,7 @@ import io
 import json
 
 import numpy as np
+import OpenImageIO
 import pytest
 
 import mdfconv
@@ -49,7 +50,7 @@ def test_spectrum_and_picture(lamp, tmp_path):
 def test_on_a_terminal(lamp):
     status, text = run_on_terminal("light", lamp, COLUMNS="80", NO_COLOR="1")
     assert status == 0
-    assert "of the way from a sun" in text
+    assert "Fine detail: C_l falls like" in text
 
 
 @pytest.mark.parametrize("ending", ["hdr", "tif"])
@@ -148,3 +149,38 @@ def test_nothing_is_better_than_the_fit_under_a_light(lamp):
             if method.covers(*map(mdfconv.distribution, ("beckmann", target)), metric_named(metric))
         }
         assert all(errors["fit"].rmse <= other.rmse * (1 + 1e-9) for other in errors.values())
+
+
+def test_a_part_of_a_picture_is_none(tmp_path):
+    path = tmp_path / "crop.exr"
+    shape = OpenImageIO.ImageSpec(128, 64, 3, "float")
+    shape.full_width, shape.full_height = 512, 256
+    output = OpenImageIO.ImageOutput.create(str(path))
+    output.open(str(path), shape)
+    output.write_image(np.ones((64, 128, 3), np.float32))
+    output.close()
+    status, out, err = run("light", path)
+    assert (status, out) == (2, "")
+    assert "a part of a larger picture" in err
+
+
+def test_what_has_no_best_fit(lamp):
+    for m_b, reason in (("1e-300", "has no best ggx under"), ("0", "m_B > 0")):
+        status, out, err = run("light", lamp, "--m-b", m_b)
+        assert (status, out) == (2, "")
+        assert err.count("\n") == 1
+        assert reason in err
+
+
+def test_names_of_maps(tmp_path):
+    odd = write_map(tmp_path / "a:b\nc # %d.exr", room())
+    assert run("light", odd)[0] == 0
+    code = run(
+        "formula", "--from", "beckmann", "--to", "ggx", "--metric", f"light:{odd}", "--range",
+        "0.1:0.4",
+    )[1]  # fmt: skip
+    assert all(line.startswith(("//", "float", "    ", "}")) for line in code.splitlines())
+    status, _, err = run("light", "x" * 300 + ".exr")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "cannot read" in err
+    assert run("convert", "--from", "ggx", "--to", "gauss", "--metric", "", "0.2")[0] == 2

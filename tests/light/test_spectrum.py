@@ -87,7 +87,7 @@ def test_lobe_spectrum(name, degree, m_b):
     lobes = LobeSpectrum(100)
     ours = np.interp(degree + 0.5, lobes.degree, lobes(mdf, np.array([[parameter]]))[0])
     # Between two degrees of the smooth part there is an interpolation.
-    assert ours == pytest.approx(by_quadrature(mdf, parameter, degree), abs=3e-4)
+    assert ours == pytest.approx(by_quadrature(mdf, parameter, degree), abs=1e-3)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -105,7 +105,7 @@ def test_a_mirror_keeps_all_and_a_slope_is_one(name):
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "beckmann"])
 @pytest.mark.parametrize(
-    ("spectrum", "metric", "tolerance"), [(WHITE, "energy", 1e-5), (NATURE, "environment", 1e-4)]
+    ("spectrum", "metric", "tolerance"), [(WHITE, "energy", 2e-5), (NATURE, "environment", 1e-4)]
 )
 def test_the_sum_is_the_integral(name, spectrum, metric, tolerance):
     source, target = mdfconv.distribution("beckmann"), mdfconv.distribution(name)
@@ -113,3 +113,41 @@ def test_the_sum_is_the_integral(name, spectrum, metric, tolerance):
     got = fit(source, parameter, target, Light(spectrum)).parameter
     wanted = fit(source, parameter, target, metric_named(metric)).parameter
     np.testing.assert_allclose(got, wanted, rtol=tolerance)
+
+
+@pytest.mark.parametrize("height", [64, 128])
+def test_what_is_smooth_is_soft(height):
+    """The rule over the zenith is exact: no power leaks from one degree into others."""
+    zenith, _ = directions(height)
+    luminance = np.broadcast_to(1 + np.cos(zenith), (height, 2 * height))
+    spectrum = spectrum_of(luminance)
+    np.testing.assert_allclose(spectrum.power[2:], 0, atol=1e-25)
+    assert spectrum.exponent == 6
+
+
+def test_two_halves_of_a_sphere():
+    zenith, _ = directions(128)
+    spectrum = spectrum_of(np.broadcast_to(np.where(zenith < np.pi / 2, 1.0, 0.1), (128, 256)))
+    # The coefficients of a step fall like l^−3/2, those of even degrees are 0.
+    assert spectrum.exponent == pytest.approx(3, abs=0.3)
+
+
+@pytest.mark.parametrize("name", ["ggx", "gauss", "blinn-phong", "schlick", "sawicki"])
+def test_mirrors_convert_alike(name):
+    source, target = mdfconv.distribution("beckmann"), mdfconv.distribution(name)
+    given_ = np.array([1e-7, 1e-9, 1e-12, 1e-15])
+    light = Light(Spectrum((DEGREES + 0.5) ** -2.8))
+    tangent = target.half_tangent(fit(source, given_, target, light).parameter)
+    np.testing.assert_allclose(tangent / given_, tangent[0] / given_[0], rtol=1e-4)
+
+
+def test_the_roughest_lobes_are_resolved():
+    lobes = LobeSpectrum(63)
+    # A ring at the horizon reflects everything to the opposite direction: k_l = P_l(−1).
+    ring = lobes(mdfconv.distribution("beckmann"), np.array([[1e4]]))[0, :8]
+    np.testing.assert_allclose(ring, (-1.0) ** np.arange(1, 9), atol=1e-3)
+    light = Light(Spectrum((DEGREES[:64] + 0.5) ** -2.8))
+    ends = mdfconv.distribution("ggx"), mdfconv.distribution("beckmann")
+    found = fit(ends[0], np.array([0.85, 0.9, 0.99]), ends[1], light).parameter
+    assert (np.diff(found) > 0).all()
+    assert 1 < found[0] < found[-1] < 2

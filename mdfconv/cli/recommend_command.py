@@ -104,10 +104,10 @@ def _table(rows: list[dict[str, Any]], asked: dict[str, Any]) -> Any:
     shown = [
         {
             "distribution": row["distribution"],
-            "parameter": value_text(row["parameter"]),
+            "parameter": f"{row['parameter']:.6g}",
             "by": row["method"],
             "ns": f"{row['ns']:.3g}",
-            "operations": row["operations"],
+            "ops": row["operations"],
             "RMSE": f"{row['rmse']:.3g}",
             "max error": f"{row['max_error']:.3g}",
             "within": "✓" if row["within"] else "",

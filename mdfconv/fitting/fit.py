@@ -216,6 +216,8 @@ def _between_knots(
         best[rows], distance[rows] = _warm(source, parameter[rows], target, metric, near)
     usual = np.interp(x, knots[known], fits.distance[known])
     astray = ~(distance <= _AS_USUAL * usual)
+    if metric.similar_below:
+        astray |= source.half_tangent(parameter) < metric.similar_below
     return _with_limits(np.where(astray, np.nan, best), distance, target)
 
 

@@ -23,7 +23,9 @@ from mdfconv.paper.table2 import paper_sweep
 LOOP = "curve_fit"
 # The paper's sweep, and every range of widths here, is one of this distribution's m_B.
 _PAPER_SOURCE = "beckmann"
-_PATIENCE = 1.0  # seconds for the many values of `Sizes.conversions`
+# Seconds for the many values of `Sizes.conversions`, judged by a few of them, of which each costs
+# several times as much.
+_PATIENCE = 3.0
 
 _Convert: TypeAlias = Callable[[Array], Array]
 

@@ -7,10 +7,8 @@ import numpy as np
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.problem import bounded_tangent
 from mdfconv.fitting.quadrature import LobeQuadrature
-
-# Beyond this tan β_half, or without a β_half, a lobe is as wide as the hemisphere.
-_WIDEST_TANGENT = 20.0
 
 
 def hemisphere(
@@ -34,8 +32,7 @@ def hemisphere(
     peak : numpy.ndarray, shape (n, 1)
         max D, which the signals of other distributions are taken relative to.
     """
-    tangent = source.half_tangent(parameter)
-    width = np.arctan(np.where(tangent < _WIDEST_TANGENT, tangent, _WIDEST_TANGENT))
+    width = np.arctan(bounded_tangent(source, parameter))
     beta, weight = LobeQuadrature(width).nodes(np.arange(parameter.size))
     column = parameter[:, None]
     peak = source.maximum(column, normalized=metric.normalized)

@@ -100,9 +100,9 @@ def fit(
             rows = there[part]
             near, distance[rows] = _warm(source, parameter[rows], target, metric, start[rows])
             best[rows] = start[rows] if stored.exact else near
-    for search in (_between_knots, cold_fit):
+    for search, most_left in ((_between_knots, _KNOTS), (cold_fit, 0)):
         rest = np.flatnonzero(np.isnan(best))
-        if rest.size > (_KNOTS if search is _between_knots else 0):
+        if rest.size > most_left:
             found = search(source, parameter[rest], target, metric)
             best[rest], distance[rest] = found.parameter, found.distance
     return _with_limits(best, distance, target)
@@ -117,16 +117,17 @@ def cold_fit(
 ) -> Fit:
     """Fit without knowing where the minimum is: as `fit`, which it checks."""
     best, distance = np.full((2, parameter.size), np.nan)
-    tangent = source.half_tangent(parameter) if metric.similar_below else np.ones(parameter.size)
-    similar = tangent < metric.similar_below
-    fitted = parameter.copy()
-    fitted[similar] = source.from_half_tangent(metric.similar_below)
+    fitted = parameter
+    if metric.similar_below:
+        scale = source.half_tangent(parameter) / metric.similar_below
+        similar = scale < 1
+        fitted = np.where(similar, source.from_half_tangent(metric.similar_below), parameter)
     for rows in _batches(parameter.size, _ROWS_AT_ONCE):
         problem = Problem(source, fitted, target, metric, quadrature, rows)
         best[rows], distance[rows] = _minimum(problem)
-    if similar.any():
-        scale = tangent[similar] / metric.similar_below
-        best[similar] = target.from_half_tangent(target.half_tangent(best[similar]) * scale)
+    if metric.similar_below and similar.any():
+        tangent = target.half_tangent(best[similar]) * scale[similar]
+        best[similar] = target.from_half_tangent(tangent)
     return _with_limits(best, distance, target)
 
 

@@ -56,7 +56,7 @@ class Problem:
         self.target, self.metric = target, metric
         self._source = source
         self._source_parameter = parameter[rows][:, None]
-        self.tangent = _tangent(source, parameter[rows])
+        self.tangent = bounded_tangent(source, parameter[rows])
         self._peak = source.maximum(self._source_parameter, normalized=metric.normalized)
         if quadrature is None:
             self._quadrature: Quadrature = metric.quadrature(np.arctan(self.tangent))
@@ -222,10 +222,11 @@ def near_problem(
 
 def narrowest(source: Distribution, parameter: Array, target: Distribution, result: Array) -> Array:
     """Return β_half of the narrower lobe of each pair, radians, shape (n,)."""
-    tangents = _tangent(source, parameter), _tangent(target, result)
+    tangents = bounded_tangent(source, parameter), bounded_tangent(target, result)
     return np.arctan(np.minimum(*tangents))
 
 
-def _tangent(distribution: Distribution, parameter: Array) -> Array:
+def bounded_tangent(distribution: Distribution, parameter: Array) -> Array:
+    """Return tan β_half, shape (n,), at most that of a lobe as wide as the hemisphere."""
     tangent = distribution.half_tangent(parameter)
     return np.where(tangent < _WIDEST_TANGENT, tangent, _WIDEST_TANGENT)

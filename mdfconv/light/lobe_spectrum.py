@@ -75,10 +75,10 @@ class LobeSpectrum:
     def _smooth_count(self) -> int:
         return self.degree.size - self._highest
 
-    @property
+    @cached_property
     def _angles(self) -> tuple[Array, Array]:
         """The angles at which lobes are sampled, for low and for high degrees."""
-        return self._beta, self._radii[self._radii < np.pi / 2]
+        return self._panels[0], self._radii[self._radii < np.pi / 2]
 
     @cached_property
     def _panels(self) -> tuple[Array, Array]:
@@ -88,10 +88,6 @@ class LobeSpectrum:
         edges = np.concatenate([[0.0], lobe, even, np.pi / 2 * _TOWARDS_HORIZON])
         beta, weight = gauss_panels(np.sort(edges)[None, :], _ORDER)
         return beta[0], weight[0]
-
-    @property
-    def _beta(self) -> Array:
-        return self._panels[0]
 
     @cached_property
     def _legendre(self) -> Array:

@@ -90,10 +90,7 @@ def light_report(path: str | Path, m_b: Sequence[float]) -> LightReport:
             lost = parameter[int(np.argmax(np.isnan(columns[name])))]
             raise MdfconvError(f"{SOURCE} m_B = {lost:g} has no best {TARGET} under {name}")
     columns["ratio"] = columns["light"] / parameter
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    softness = float(np.clip((spectrum.exponent - SUN) / (OVERCAST - SUN), 0, 1))
-    conversions = [dict(zip(columns, row, strict=True)) for row in rows]
     shown = "m_b", "light", "ratio", *METRICS
-    return LightReport(
-        spectrum, softness, [{name: row[name] for name in shown} for row in conversions]
-    )
+    rows = zip(*(columns[name].tolist() for name in shown), strict=True)
+    softness = float(np.clip((spectrum.exponent - SUN) / (OVERCAST - SUN), 0, 1))
+    return LightReport(spectrum, softness, [dict(zip(shown, row, strict=True)) for row in rows])

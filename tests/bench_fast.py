@@ -21,7 +21,7 @@ from mdfconv.fitting.fit import fit
 from mdfconv.fitting.metrics import list_metrics, metric_named
 
 NAMES = [entry.name for entry in one_parameter_distributions() if entry.map_variables]
-LIMIT = {"unit": 1e-6, "energy": 1e-6, "display": 1e-4, "environment": 1e-6}
+LIMIT = {"unit": 1e-6, "energy": 1e-6, "display": 1e-5, "environment": 1e-6}
 MILLION = 1_000_000
 REPEATS = 7
 

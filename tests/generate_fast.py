@@ -2,7 +2,7 @@
 
     python -m tests.generate_fast [FILE]
 
-Takes some minutes; the same fit gives the same file.
+Takes some minutes; the same fit gives the same file, and what is stored starts none of them.
 """
 
 import itertools
@@ -11,13 +11,13 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 import mdfconv
 from mdfconv.distributions import one_parameter_distributions
 from mdfconv.distributions.equivalence import exact_route, to_root
 from mdfconv.fitting import maps
-from mdfconv.fitting.fit import cold_fit
+from mdfconv.fitting.fit import FitCurve, cold_fit
+from mdfconv.fitting.map_making import MapMaker, Piece
 from mdfconv.fitting.metrics import list_metrics, metric_named
 
 # A distribution that is another one in another parameter is a target of its own: near a uniform
@@ -27,134 +27,86 @@ SOURCES = [name for name in TARGETS if name != "smoothie"]
 # Lobes that become uniform at x = 1, and those that can become so with relative precision.
 UNIFORM_SOURCES, UNIFORM_TARGETS = ("ggx", "schlick"), ("gauss", "ggx", "blinn-phong", "smoothie")
 # A tenth or less of what the method promises.
-TOLERANCE = {"unit": 5e-8, "energy": 5e-8, "display": 2e-5, "environment": 5e-8}
+TOLERANCE = {"unit": 5e-8, "energy": 5e-8, "display": 1e-6, "environment": 5e-8}
 # The roughest source of each kind; towards a uniform lobe both ends are singular.
 ROUGHEST = {"blinn-phong": 0.1, "sawicki": 0.1, "schlick": 1 - 1e-6}
 # What stays short of uniform has no such end.
 BOUNDED = ("beckmann",)
 LEAST_TARGET = {"sawicki": 0.01}
-NODES = 32
-MOST_TERMS = 25
+# Fits between so many x start from those there.
+GRID = 129
+# A jump of the fit stays within a piece so narrow in x.
 NARROWEST = 1e-7
 BISECTIONS = 44
 
 
-class Pair:
-    """One map in the making: the fit as a function of x."""
+class Pair(MapMaker):
+    """One map in the making, its fits cold where those of a grid lead nowhere."""
 
     def __init__(self, source, target, metric_name):
         self.names = source, target
         self.source, self.target = mdfconv.distribution(source), mdfconv.distribution(target)
         self.metric = metric_named(metric_name)
-        self.variables = self.source.map_variables, self.target.map_variables
-        self.factored = source in UNIFORM_SOURCES and target in UNIFORM_TARGETS
-        self.tolerance = TOLERANCE[metric_name]
+        super().__init__(
+            (self.source.map_variables, self.target.map_variables),
+            source in UNIFORM_SOURCES and target in UNIFORM_TARGETS,
+            self.answer,
+            TOLERANCE[metric_name],
+            NARROWEST,
+        )
+        roughest = 1.0 if target in BOUNDED and source == "schlick" else ROUGHEST.get(source, 1.0)
+        self.end = float(self.source.map_variables.width(np.float64(roughest)))
+        if self.factored and source == "ggx":
+            self.end = 1 - 1e-9
+        self.grid = self.end * np.linspace(0, 1, GRID)[1:]
+        knots = self.source.map_variables.from_width(self.grid)
+        self.curve = FitCurve(self.source, knots, self.target, self.metric)
 
-    def parameter(self, x):
-        """Return the source's parameter for x."""
-        return self.variables[0].from_width(np.atleast_1d(x))
-
-    def answer(self, x):
-        """Return the fit's parameter, NaN where there is none that is usable."""
-        got = cold_fit(self.source, self.parameter(x), self.target, self.metric).parameter
+    def answer(self, parameter):
+        """Return the fits' parameters, NaN where there is none that is usable."""
+        got = self.curve(parameter).parameter
+        cold = np.isnan(got)
+        if cold.any():
+            fits = cold_fit(self.source, parameter[cold], self.target, self.metric)
+            got[cold] = fits.parameter
         with np.errstate(invalid="ignore"):
             return np.where(got >= LEAST_TARGET.get(self.names[1], 0), got, np.nan)
 
     def limited(self, x):
         """Return where the fit lies at the end of the target's legal range."""
-        return cold_fit(self.source, self.parameter(x), self.target, self.metric).at_limit
-
-    def stored(self, x, answer):
-        """Return the function that is to be stored."""
-        product = x * x * self.variables[1].concentration(answer)
-        return product / ((1 - x) * (1 + x)) if self.factored else product
-
-    def from_stored(self, x, value):
-        """Return the parameter for the stored function."""
-        product = value * (1 - x) * (1 + x) if self.factored else value
-        return self.variables[1].from_map(x, product)
+        upper = self.target.parameter.upper
+        return (self.fitted(x) == upper) & self.target.parameter.upper_closed
 
 
 def boundary(inside, low, high):
     """Return where a condition that holds at `low` and not at `high` ends."""
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if inside(middle) else (low, middle)
+        low, high = (middle, high) if inside(np.array([middle]))[0] else (low, middle)
     return low
 
 
 def outline(pair):
     """Return the end of the range and the x at which the fit is known not to be smooth."""
     source, target = pair.names
-    roughest = 1.0 if target in BOUNDED and source == "schlick" else ROUGHEST.get(source, 1.0)
-    end = float(pair.variables[0].width(np.float64(roughest)))
-    if pair.factored and source == "ggx":
-        end = 1 - 1e-9
-    grid = end * np.linspace(0, 1, 129)[1:]
-    answers, limited = pair.answer(grid), pair.limited(grid)
+    grid, end = pair.grid, pair.end
+    answers, limited = pair.fitted(grid), pair.limited(grid)
     if np.isnan(answers).any():
         first = int(np.argmax(np.isnan(answers)))
-        end = boundary(lambda x: np.isfinite(pair.answer(x)[0]), grid[first - 1], grid[first])
+        end = boundary(lambda x: np.isfinite(pair.fitted(x)), grid[first - 1], grid[first])
         end *= 1 - 1e-9
     breaks = []
     if limited.any():
         first = int(np.argmax(limited))
-        breaks.append(boundary(lambda x: not pair.limited(x)[0], grid[first - 1], grid[first]))
+        breaks.append(boundary(lambda x: ~pair.limited(x), grid[first - 1], grid[first]))
     # From 1/√2 on Beckmann's maximum is off the normal.
     off_axis = np.sqrt(0.5)
     if source == "beckmann":
         breaks.append(off_axis)
     if target == "beckmann" and np.nanmax(answers) > off_axis:
         first = int(np.argmax(answers > off_axis))
-        breaks.append(
-            boundary(lambda x: pair.answer(x)[0] < off_axis, *grid[first - 1 : first + 1])
-        )
+        breaks.append(boundary(lambda x: pair.fitted(x) < off_axis, *grid[first - 1 : first + 1]))
     return end, sorted(x for x in breaks if x < end)
-
-
-def polynomial(pair, low, high):
-    """Return the shortest polynomial on a piece within the tolerance, and its error."""
-    z = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-    x = 0.5 * (low + high) + 0.5 * (high - low) * z
-    series = chebyshev.chebfit(z, pair.stored(x, pair.answer(x)), NODES - 1)
-    # The upper end, where a target may run out, is the hardest place; the lower may be 0.
-    z = np.linspace(-1, 1, 38)[1:]
-    x = 0.5 * (low + high) + 0.5 * (high - low) * z
-    wanted = pair.answer(x)
-    worst = np.inf
-    for terms in range(1, MOST_TERMS + 1):
-        power = chebyshev.cheb2poly(series[:terms])
-        got = pair.from_stored(x, np.polynomial.polynomial.polyval(z, power))
-        worst = np.max(np.abs(got / wanted - 1))
-        if worst < pair.tolerance:
-            return power, worst
-    return power, worst
-
-
-def bend(pair, low, high):
-    """Return where the fit jumps or bends in a piece, None if it is smooth."""
-    # At 0 there is no surface.
-    start = low, high = max(low, 1e-9), high
-    for _ in range(20):
-        x = np.linspace(low, high, 9)
-        second = np.abs(np.diff(pair.stored(x, pair.answer(x)), 2))
-        peak = int(np.argmax(second))
-        if second[peak] < 8 * np.median(second):
-            return None
-        low, high = x[peak], x[peak + 2]
-    return None if low == start[0] or high == start[1] else 0.5 * (low + high)
-
-
-def pieces(pair, low, high, depth=0):
-    """Yield the pieces between two x: (low, high, polynomial, error)."""
-    power, worst = polynomial(pair, low, high)
-    if worst < pair.tolerance or high - low < NARROWEST:
-        yield low, high, power, worst
-        return
-    middle = bend(pair, low, high) if depth == 2 or depth == 5 else None
-    middle = 0.5 * (low + high) if middle is None else middle
-    yield from pieces(pair, low, middle, depth + 1)
-    yield from pieces(pair, middle, high, depth + 1)
 
 
 def make(key):
@@ -163,17 +115,15 @@ def make(key):
     pair = Pair(source, target, name)
     end, breaks = outline(pair)
     ends = [0.0, *breaks, end]
-    found = [piece for low, high in itertools.pairwise(ends) for piece in pieces(pair, low, high)]
+    found = [piece for low, high in itertools.pairwise(ends) for piece in pair.pieces(low, high)]
     if (source, target) == ("schlick", "ggx"):
         # α is 1 here within the tolerance, whatever the little that is stored.
-        found.append((end, 1.0, pair.stored(end, pair.answer(end)), 0.0))
+        x = np.array([end])
+        found.append(Piece(end, 1.0, pair.product(x, pair.fitted(x)), 0.0))
         end = 1.0
-    last = 1.0 if pair.factored and source == "ggx" else end
-    edges = np.array([low for low, *_ in found] + [last])
-    powers = tuple(power for _, _, power, _ in found)
-    entry = maps.Map(edges, powers, pair.factored)
-    worst = max(piece[-1] for piece in found)
-    sizes = [power.size for _, _, power, _ in found]
+    entry = pair.map(found, 1.0 if pair.factored and source == "ggx" else end)
+    worst = max(piece.error for piece in found)
+    sizes = [piece.coefficients.size for piece in found]
     return key, entry, f"to x = {end:.6f}, worst {worst:.1e}, terms {sizes}"
 
 

@@ -41,9 +41,9 @@ def convert(
         ``"ggx:glossiness"`` (α = (1−g)²).
     method : str, optional
         ``"closed-form"``, ``"half-angle"``, ``"ward"``, ``"peak"``, ``"fit"`` or ``"fast"``,
-        which is the fit within 1e-6 (display: 1e-4) at the price of a closed form. If not
-        given the fit under the metric, by ``"fast"`` where that reaches; without a metric the
-        closed form of a pair that has one.
+        which is the fit within 1e-6 (display: 1e-5, at another exposure 1e-4) at the price of a
+        closed form. If not given the fit under the metric, by ``"fast"`` where that reaches;
+        without a metric the closed form of a pair that has one.
     metric : str or Metric, optional
         What the fit keeps: ``"unit"`` (the shape of the lobe; also if not given), ``"energy"``
         (the light of the sun or a lamp), ``"environment"`` (the light of a natural environment),

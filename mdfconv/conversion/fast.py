@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from mdfconv.conversion.least_squares import METHOD as FIT
 from mdfconv.conversion.method import Method
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.maps import StoredFit
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 
+# Fewer values are fitted sooner than a map is made.
+_MANY = 8192
+
 
 class Fast(Method):
-    """The least-squares fit from stored polynomials: 1e-6 from it, 1e-4 for a display.
+    """The least-squares fit from stored polynomials: 1e-6 from it, 1e-5 for a display.
 
     Covers the usual range of the source (N from 0.1) as far as the fit does and the target
-    stays usable, under the metrics for which there are maps.
+    stays usable, under the metrics for which there are maps. For a display at another exposure
+    than 1 many values have a map made for them, within 1e-4.
     """
 
     name = "fast"
@@ -32,18 +37,25 @@ class Fast(Method):
         return ("stored least squares",) if covered else None
 
     def covers(self, source: Distribution, target: Distribution, metric: Metric) -> bool:
-        """Return whether there is a map (for the display metric at exposure 1) or a constant."""
-        return StoredFit(source, target, metric).known
+        """Return whether there is a map, one to make others from, or a constant."""
+        return StoredFit(source, target, metric.from_stored()[0]).known
 
     def convert(
         self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
     ) -> Array:
         """Evaluate the polynomials; NaN outside their range."""
-        return StoredFit(source, target, metric)(parameter)
+        stored = StoredFit(source, target, metric.from_stored()[0])
+        if len(metric.from_stored()) > 1 and not stored.exact:
+            from mdfconv.fitting.map_making import made_map
+
+            if parameter.size < _MANY:
+                return FIT.convert(parameter, source, target, metric)
+            stored = stored.with_map(made_map(*stored.pair, str(metric)))
+        return stored(parameter)
 
     def range_text(self, source: Distribution, target: Distribution, metric: Metric) -> str:
         """Return which parameters of the source the stored maps cover."""
-        return StoredFit(source, target, metric).range_text()
+        return StoredFit(source, target, metric.from_stored()[0]).range_text()
 
 
 METHOD = Fast()

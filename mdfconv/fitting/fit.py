@@ -10,7 +10,8 @@ problems of a batch advance together.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,11 +27,14 @@ from mdfconv.fitting.scan import lowest_minima, scan
 # The intermediates of a scan, 76 candidates × 250 angles a row, stay in the cache, and those of a
 # warm start, 68 angles a row.
 _ROWS_AT_ONCE, _WARM_ROWS = 32, 256
-# A stored fit is within 1e-6 in ln p (display: 1e-4): a step beyond leaves the neighbourhood.
-_LARGEST_STEP, _MOST_LEFT = 1e-3, 0.9
+# A stored fit is within 1e-6 in ln p: a step far beyond leaves the neighbourhood. A start that is
+# worse takes some steps to come so near.
+_LARGEST_STEP, _MORE_DESCENTS = 1e-4, 2
+# Steps that do not shrink to this share lead nowhere; the smallest are rounding.
+_MOST_LEFT, _ROUNDING = 0.9, 1e-7
 # With more values than knots, those between knots start from a curve through the knots' fits. What
 # ends far above their distances has missed the lowest minimum.
-_KNOTS, _LEAST_KNOTS, _DESCENTS, _AS_USUAL = 64, 4, 1, 1.05
+_KNOTS, _LEAST_KNOTS, _AS_USUAL = 64, 4, 1.05
 # From the hemisphere to samples of a part of it a fit moves by some per cent, from a few of them to
 # all by some per mille.
 _DESCENTS_ON_FEW, _LARGEST_FROM_FEW = 3, 1e-2
@@ -84,28 +88,31 @@ def fit(
     Fit
         The global minimum of each problem.
     """
-    best, distance = np.full((2, parameter.size), np.nan)
-    stored = StoredFit(source, target, metric)
     if quadrature is not None:
-        if stored.known:
-            best, distance = _on_samples(source, parameter, target, metric, quadrature, stored)
-        if np.isnan(best).any():
+        found = _on_samples(source, parameter, target, metric, quadrature)
+        if np.isnan(found.parameter).any():
             return cold_fit(source, parameter, target, metric, quadrature)
-        return _with_limits(best, distance, target)
-    if stored.known:
-        with np.errstate(all="ignore"):
-            start = stored(parameter)
-        there = np.flatnonzero(target.parameter.accepts(start))
-        for part in _batches(there.size, _WARM_ROWS):
-            rows = there[part]
-            near, distance[rows] = _warm(source, parameter[rows], target, metric, start[rows])
-            best[rows] = start[rows] if stored.exact else near
+        return found
+    found = warm_fit(source, parameter, target, metric)
+    best, distance = found.parameter, found.distance
     for search, most_left in ((_between_knots, _KNOTS), (cold_fit, 0)):
         rest = np.flatnonzero(np.isnan(best))
         if rest.size > most_left:
             found = search(source, parameter[rest], target, metric)
             best[rest], distance[rest] = found.parameter, found.distance
     return _with_limits(best, distance, target)
+
+
+def warm_fit(source: Distribution, parameter: Array, target: Distribution, metric: Metric) -> Fit:
+    """Fit from where the minimum is known to be near: as `fit`, NaN where that is not known."""
+    way = metric.from_stored()
+    stored = StoredFit(source, target, way[0])
+    if not stored.known:
+        return _nowhere(parameter.size, target)
+    with np.errstate(all="ignore"):
+        start = stored(parameter)
+    found = _fit_near(source, parameter, target, way[1:] or way, start)
+    return replace(found, parameter=start) if stored.exact else found
 
 
 def cold_fit(
@@ -131,21 +138,37 @@ def cold_fit(
     return _with_limits(best, distance, target)
 
 
+def _nowhere(size: int, target: Distribution) -> Fit:
+    nowhere = np.full(size, np.nan)
+    return _with_limits(nowhere, nowhere.copy(), target)
+
+
 def _with_limits(best: Array, distance: Array, target: Distribution) -> Fit:
     limits = target.parameter
     return Fit(best, distance, (best == limits.upper) & limits.upper_closed)
 
 
-def _warm(
-    source: Distribution, parameter: Array, target: Distribution, metric: Metric, start: Array
-) -> tuple[Array, Array]:
-    """Return the fits near others, and their distances; NaN where there is none."""
-    with np.errstate(all="ignore"):
-        problem = near_problem(source, parameter, target, start, metric)
-        best, distance = descend(problem, start)
-        step = np.log(best / start)
-    stays = (np.abs(step) <= _LARGEST_STEP) & target.parameter.accepts(best)
-    return np.where(stays, best, np.nan), distance
+def _fit_near(
+    source: Distribution, parameter: Array, target: Distribution, way: Sequence[Metric], near: Array
+) -> Fit:
+    """Return the fits under the last of some metrics, each near those under the one before.
+
+    NaN where they start from none, or a last step says that another minimum may be the lowest.
+    """
+    best, distance = np.full((2, parameter.size), np.nan)
+    there = np.flatnonzero(target.parameter.accepts(near))
+    for part in _batches(there.size, _WARM_ROWS):
+        rows = there[part]
+        start = near[rows]
+        for metric in way if len(way) == 1 else [*way, *[way[-1]] * _MORE_DESCENTS]:
+            with np.errstate(all="ignore"):
+                problem = near_problem(source, parameter[rows], target, start, metric)
+                found, distance[rows] = descend(problem, start)
+                step = np.log(found / start)
+            legal = target.parameter.accepts(found)
+            start = np.where(legal, found, start)
+        best[rows] = np.where(legal & (np.abs(step) <= _LARGEST_STEP), found, np.nan)
+    return _with_limits(best, distance, target)
 
 
 def _on_samples(
@@ -154,22 +177,26 @@ def _on_samples(
     target: Distribution,
     metric: Metric,
     quadrature: Quadrature,
-    stored: StoredFit,
-) -> tuple[Array, Array]:
+) -> Fit:
     """Return the fits on given samples, from those over the hemisphere by way of a few samples."""
+    stored = StoredFit(source, target, metric)
+    nowhere = _nowhere(parameter.size, target)
+    if not stored.known:
+        return nowhere
     with np.errstate(all="ignore"):
         near = stored(parameter)
         if not target.parameter.accepts(near).all():
-            return np.full_like(near, np.nan), near
+            return nowhere
         few = near_problem(source, parameter, target, near, metric, _Few(quadrature))
         for _ in range(_DESCENTS_ON_FEW):
             near, _ = descend(few, near)
         if not target.parameter.accepts(near).all():
-            return np.full_like(near, np.nan), near
+            return nowhere
         problem = near_problem(source, parameter, target, near, metric, quadrature)
         best, distance = descend(problem, near)
         stays = np.abs(np.log(best / near)) <= _LARGEST_FROM_FEW
-    return np.where(stays & target.parameter.accepts(best), best, np.nan), distance
+    best = np.where(stays & target.parameter.accepts(best), best, np.nan)
+    return _with_limits(best, distance, target)
 
 
 class _Few:
@@ -190,49 +217,72 @@ class _Few:
 def _between_knots(
     source: Distribution, parameter: Array, target: Distribution, metric: Metric
 ) -> Fit:
-    """Fit many values from fits of a few between which they lie; NaN where that leads astray.
-
-    It does where the lowest minimum changes from one to another, or the fit runs into a limit.
-    """
-    from scipy.interpolate import PchipInterpolator
-
-    best, distance = np.full((2, parameter.size), np.nan)
+    """Fit many values from fits of a few between which they lie."""
     x = np.log(parameter)
-    knots = np.linspace(x.min(), x.max(), _KNOTS)
-    fits = cold_fit(source, np.exp(knots), target, metric)
-    known = ~np.isnan(fits.parameter) & (np.diff(knots, prepend=-np.inf) > 0)
-    if np.count_nonzero(known) < _LEAST_KNOTS:
-        return _with_limits(best, distance, target)
-    curve = PchipInterpolator(knots[known], np.log(fits.parameter[known]), extrapolate=False)
-    start = np.exp(curve(x))
-    there = np.flatnonzero(target.parameter.accepts(start))
-    for part in _batches(there.size, _WARM_ROWS):
-        rows = there[part]
-        near = start[rows]
-        for _ in range(_DESCENTS):
-            with np.errstate(all="ignore"):
-                problem = near_problem(source, parameter[rows], target, near, metric)
-                nearer, _ = descend(problem, near)
-            near = np.where(target.parameter.accepts(nearer), nearer, near)
-        best[rows], distance[rows] = _warm(source, parameter[rows], target, metric, near)
-    usual = np.interp(x, knots[known], fits.distance[known])
-    astray = ~(distance <= _AS_USUAL * usual)
-    if metric.similar_below:
-        astray |= source.half_tangent(parameter) < metric.similar_below
-    return _with_limits(np.where(astray, np.nan, best), distance, target)
+    knots = np.exp(np.linspace(x.min(), x.max(), _KNOTS))
+    return FitCurve(source, knots, target, metric)(parameter)
+
+
+class FitCurve:
+    """Fits of a few values, and those of others near a curve through them.
+
+    Parameters
+    ----------
+    source, target, metric
+        As for `fit`.
+    knots : numpy.ndarray, shape (k,)
+        Legal parameters of the source.
+
+    Attributes
+    ----------
+    fits : Fit
+        Those of the knots.
+    """
+
+    def __init__(
+        self, source: Distribution, knots: Array, target: Distribution, metric: Metric
+    ) -> None:
+        self._problem = source, target, metric
+        self.fits = cold_fit(source, knots, target, metric)
+        order = np.argsort(knots)
+        x = np.log(knots[order])
+        known = ~np.isnan(self.fits.parameter[order]) & (np.diff(x, prepend=-np.inf) > 0)
+        self._log_knots, self._known = x[known], order[known]
+
+    def __call__(self, parameter: Array) -> Fit:
+        """Return the fits of values, shape (n,); NaN where the curve leads astray.
+
+        It does where the lowest minimum changes from one to another, or the fit runs into a limit.
+        """
+        from scipy.interpolate import PchipInterpolator
+
+        source, target, metric = self._problem
+        if self._log_knots.size < _LEAST_KNOTS:
+            return _nowhere(parameter.size, target)
+        x = np.log(parameter)
+        through = np.log(self.fits.parameter[self._known])
+        start = np.exp(PchipInterpolator(self._log_knots, through, extrapolate=False)(x))
+        found = _fit_near(source, parameter, target, [metric, metric], start)
+        usual = np.interp(x, self._log_knots, self.fits.distance[self._known])
+        astray = ~(found.distance <= _AS_USUAL * usual)
+        if metric.similar_below:
+            astray |= source.half_tangent(parameter) < metric.similar_below
+        best = np.where(astray, np.nan, found.parameter)
+        return _with_limits(best, found.distance, target)
 
 
 def descend(problem: Problem, start: Array) -> tuple[Array, Array]:
     """Return the minima near parameters that nearly are, and the distances there.
 
     A Gauss-Newton step leaves a constant share of the error, a large one where lobes are clipped:
-    two of them say where all would lead (Aitken 1926).
+    two of them say where all would lead (Aitken 1926). NaN where they hardly shrink.
     """
     first, _ = problem.step(np.log(start))
     second, distance = problem.step(np.log(start) + first)
-    left = np.clip(second / first, -_MOST_LEFT, _MOST_LEFT)
-    moved = first + second / (1 - np.where(np.isfinite(left), left, 0))
-    return start * np.exp(moved), distance
+    left = second / first
+    lost = (np.abs(left) > _MOST_LEFT) & (np.abs(first) > _ROUNDING)
+    moved = first + second / (1 - np.where(np.abs(left) <= _MOST_LEFT, left, 0))
+    return np.where(lost, np.nan, start * np.exp(moved)), distance
 
 
 def _batches(size: int, rows: int) -> list[Indices]:

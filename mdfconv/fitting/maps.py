@@ -9,6 +9,7 @@ polynomials on a few pieces, made from the fit by ``python -m tests.generate_fas
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -112,6 +113,8 @@ class StoredFit:
     ----------
     known : bool
         Whether there are any.
+    pair : tuple of str
+        Source and target of the map, "" where there is none.
     """
 
     def __init__(self, source: Distribution, target: Distribution, metric: Metric) -> None:
@@ -122,6 +125,7 @@ class StoredFit:
         self._symbol, self._above = source.parameter.symbol, source.parameter.larger_is_smoother
         self._ratio = metric.ratio(self._first, self._last)
         self._map: Map | None = None
+        self.pair = "", ""
         if self._ratio is None:
             self._find(target, str(metric))
 
@@ -130,6 +134,7 @@ class StoredFit:
             stored = load().get(f"{metric} {self._first.name} {last.name}")
             if stored and self._first.map_variables and last.map_variables:
                 self._map, self._variables = stored, (self._first.map_variables, last.map_variables)
+                self.pair = self._first.name, last.name
                 if last is target:
                     self._back = ()
                 return
@@ -143,6 +148,12 @@ class StoredFit:
     def known(self) -> bool:
         """Whether there are any."""
         return self._map is not None or self._ratio is not None
+
+    def with_map(self, other: Map) -> StoredFit:
+        """Return the fits with another map of their pair."""
+        fits = copy(self)
+        fits._map = other
+        return fits
 
     def __call__(self, parameter: Array) -> Array:
         """Return the target's parameters (any shape); NaN beyond the range of the map."""

@@ -70,7 +70,7 @@ def test_what_is_not_stored_is_fitted():
     entries = mdfconv.explain(values, "blinn-phong", "ggx", metric="environment")
     assert [entry.method for entry in entries] == ["fit", "fast"]
     exposed = record(*PAIR, "--metric", "display", "--exposure", 4, 100)
-    assert (exposed["method"], exposed["metric"]) == ("fit", "display:4")
+    assert (exposed["method"], exposed["metric"]) == ("fast", "display:4")
     assert record("--from", "ggx", "--to", "gtr", "--gamma", 3, "--metric", "energy", 0.2)[
         "method"
     ] == "fit"  # fmt: skip

@@ -79,16 +79,20 @@ def test_limits_for_smooth_surfaces(measure, ratio):
     np.testing.assert_allclose(found.parameter / smooth, ratio, atol=5e-4)
 
 
-@pytest.mark.parametrize("kept", list_metrics())
+@pytest.mark.parametrize("kept", [*list_metrics(), "display:0.25", "display:3"])
 @pytest.mark.parametrize(("source", "target"), list(itertools.permutations(NAMES, 2)))
 def test_a_warm_start_finds_what_a_cold_one_finds(source, target, kept):
     ends = [mdfconv.distribution(name) for name in (source, target)]
     values = ends[0].from_half_tangent(np.append(np.geomspace(1e-6, 0.3, 4), [0.7, 1.2]))
     problem = ends[0], values[~np.isnan(values)], ends[1], metric_named(kept)
     warm, cold = fit(*problem), cold_fit(*problem)
-    tolerance = 1e-6 if kept == "display" else 3e-7
+    tolerance = 1e-6 if kept.startswith("display") else 3e-7
     np.testing.assert_array_equal(warm.at_limit, cold.at_limit)
-    assert warm.parameter == pytest.approx(cold.parameter, rel=tolerance, nan_ok=True)
+    # Where both are clipped as a whole, any lobe will do.
+    told_apart = ~(cold.distance < 1e-13)
+    assert warm.parameter[told_apart] == pytest.approx(
+        cold.parameter[told_apart], rel=tolerance, nan_ok=True
+    )
     there = ~np.isnan(cold.parameter)
     assert warm.distance[there] == pytest.approx(cold.distance[there], rel=1e-4, abs=1e-13)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import ClassVar, Self
 
 import numpy as np
@@ -71,6 +72,10 @@ class Metric(ABC):
     def __str__(self) -> str:
         """Return the name, with the setting where it is not the usual one."""
         return self.name
+
+    def from_stored(self) -> Sequence[Metric]:
+        """Return metrics from one whose fits may be stored to this, each near the one before."""
+        return (self,)
 
     @abstractmethod
     def weight(self, beta: Array) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
@@ -9,10 +11,14 @@ import numpy as np
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import Parameter, number_text
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics.base import Metric
 from mdfconv.fitting.metrics.energy import Energy
 
 # The sRGB encoding (IEC 61966-2-1) is linear up to here.
 _SRGB_TOE = 0.0031308
+# Of ln exposure, from which a fit can be followed from one exposure to the next: up to 16 times the
+# usual, beyond which rough lobes are clipped as a whole, and by a third at a time.
+_FARTHEST, _LARGEST_STEP = math.log(16), 0.35
 _EXPOSURE = Parameter("exposure", "exposure", (0.25, 4.0), default=1.0)
 
 
@@ -52,6 +58,15 @@ class Display(Energy):
         """Return the name, with the exposure unless it is 1."""
         usual = self.exposure == _EXPOSURE.default
         return self.name if usual else f"{self.name}:{number_text(self.exposure)}"
+
+    def from_stored(self) -> Sequence[Metric]:
+        """Return the exposures from the usual one to this; this alone if that is far away."""
+        way = np.log(self.exposure / _EXPOSURE.default)
+        if abs(way) > _FARTHEST:
+            return (self,)
+        steps = math.ceil(abs(way) / _LARGEST_STEP)
+        between = np.exp(np.linspace(0, way, steps + 1)[:-1])
+        return [*(type(self)(float(exposure)) for exposure in between), self]
 
     def encode(self, value: Array) -> Array:
         """Return the encoded value in [0, 1]."""

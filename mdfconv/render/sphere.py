@@ -20,7 +20,7 @@ _AREA_HALF_SIDE = 0.15  # of the distance to the square light
 _AREA_SAMPLES = 8  # a side
 _MARGIN = 1.04  # half the picture, in radii
 # Some twenty vectors for each normal, as many as this, stay in the cache.
-_NORMALS_AT_ONCE = 4096
+_NORMALS_AT_ONCE = 8192
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 from mdfconv.benchmark.measure import Measurements
 from mdfconv.benchmark.pareto import front
 from mdfconv.benchmark.timing import NOISE, Spread
-from mdfconv.output.figures import encoded, line_style, pyplot
+from mdfconv.output.figures import encoded, line_style, new_figure
 from mdfconv.output.labels import place_labels
 
 _SIZE = (10.0, 5.6)  # inches
@@ -50,7 +50,8 @@ def draw(measurements: Measurements, dpi: int = 120) -> bytes:
     dpi : int
         Resolution.
     """
-    figure, axes = pyplot().subplots(1, 2, figsize=_SIZE)
+    figure = new_figure(*_SIZE)
+    axes = figure.subplots(1, 2)
     distributions = [
         _Point(
             row.distribution,
@@ -150,7 +151,7 @@ class _Panel:
 
     def _scale(self) -> None:
         """Set logarithmic axes with a 0 at the lower end, and ticks that can be read."""
-        # Not before `pyplot` has prepared Matplotlib.
+        # Not before `new_figure` has prepared Matplotlib.
         from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 
         axes, zero = self._axes, self._zero

@@ -19,9 +19,9 @@ _MIRROR = np.array([-1.0, -1.0, 1.0])
 
 def direction(theta: Array | float, phi: Array | float = 0.0) -> Array:
     """Return unit vectors for angles from the normal and azimuths, radians."""
-    theta, phi = np.broadcast_arrays(np.asarray(theta, float), np.asarray(phi, float))
     sine = np.sin(theta)
-    return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)
+    axes = np.broadcast_arrays(sine * np.cos(phi), sine * np.sin(phi), np.cos(theta))
+    return np.stack(axes, axis=-1)
 
 
 def dot(a: Array, b: Array) -> Array:

@@ -41,7 +41,7 @@ class FurnaceModel:
     Parameters
     ----------
     brdf : callable
-        f(light, view), 1/sr, for unit vectors of shape (..., 3).
+        f(light, view), 1/sr, for unit vectors of shape (..., 3), which are broadcast.
     width : float
         About the angle, in radians, over which f falls from its peak.
     around_mirror : bool
@@ -141,9 +141,9 @@ def _around_normal(model: FurnaceModel, cosine: float) -> float:
         t, weight = _from_zero(horizon[rows], kinks[rows], model.width)
         theta = np.arctan(t)
         m = direction(theta, phi[rows, None])
-        light = reflect(np.broadcast_to(view, m.shape), m)
+        light = reflect(view, m)
         jacobian = 4 * dot(m, view) * np.sin(theta) * np.square(np.cos(theta))
-        value = model.brdf(light, np.broadcast_to(view, m.shape)) * light[..., 2]
+        value = model.brdf(light, view) * light[..., 2]
         total += float(phi_weight[rows] @ np.sum(value * jacobian * weight, axis=1))
     # The two halves of the circle are alike.
     return 2 * total
@@ -205,7 +205,7 @@ def _around_mirror(model: FurnaceModel, cosine: float) -> float:
     up, side = np.array([view[2], 0.0, view[0]]), np.array([0.0, 1.0, 0.0])
     ring = np.cos(phi)[..., None] * up + np.sin(phi)[..., None] * side
     light = np.cos(theta)[:, None, None] * mirrored + np.sin(theta)[:, None, None] * ring
-    value = model.brdf(light, np.broadcast_to(view, light.shape)) * light[..., 2]
+    value = model.brdf(light, view) * light[..., 2]
     rings = np.sum(value * weight, axis=1) * np.sin(theta)
     return float(2 * theta_weight @ rings)
 

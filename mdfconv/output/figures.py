@@ -9,7 +9,10 @@ from __future__ import annotations
 import io
 import os
 import tempfile
-from typing import Any
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mdfconv.distributions import list_distributions
 
@@ -28,28 +31,64 @@ _STYLES: tuple[tuple[str, Any], ...] = (
     ("#0072B2", (0, (12, 2, 2, 2))),
 )
 _WIDTH, _THINNER = 1.4, 0.9
+# At the usual level 6 a file is a tenth smaller and takes twice as long.
+_PNG = {"metadata": {"Software": None}, "pil_kwargs": {"compress_level": 3}}
 
 
-def pyplot() -> Any:
-    """Return Matplotlib's figure factory, without a display and without a writable home."""
+def new_figure(
+    width: float, height: float, layout: Literal["constrained"] | None = "constrained"
+) -> Any:
+    """Return an empty figure that needs neither a display nor a writable home.
+
+    Parameters
+    ----------
+    width, height : float
+        In inches.
+    layout : str, optional
+        Matplotlib's layout engine; without one the axes stay where they are put.
+    """
     if "MPLCONFIGDIR" not in os.environ and not os.access(os.path.expanduser("~"), os.W_OK):
         os.environ["MPLCONFIGDIR"] = tempfile.mkdtemp(prefix="mdfconv-")
     import matplotlib as mpl
 
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
+    # Without pyplot, which takes longer to import and keeps every figure.
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
 
-    plt.rcParams.update(
+    mpl.rcParams.update(
         {
             "font.size": 9,
             "axes.grid": True,
             "grid.color": "0.9",
             "axes.axisbelow": True,
             "legend.frameon": False,
-            "figure.constrained_layout.use": True,
         }
     )
-    return plt
+    figure = Figure(figsize=(width, height), layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def place_pixels(figure: Any, pixels: NDArray[np.uint8]) -> None:
+    """Put an image beneath all else, pixel for pixel from the upper left corner.
+
+    Matplotlib's own images are resampled, which takes longer than the rest of a large figure.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        Its resolution is that in which it is saved.
+    pixels : numpy.ndarray, shape (height, width, 4)
+        RGBA; the size is that of the figure.
+    """
+    from matplotlib.artist import Artist
+
+    class Pixels(Artist):
+        def draw(self, renderer: Any) -> None:
+            # Agg takes the lowest line first.
+            renderer.draw_image(renderer.new_gc(), 0, 0, pixels[::-1])
+
+    figure.add_artist(Pixels()).set_zorder(-1)
 
 
 def line_style(name: str) -> dict[str, Any]:
@@ -61,9 +100,8 @@ def line_style(name: str) -> dict[str, Any]:
 
 
 def encoded(figure: Any, form: str = "png", dpi: int = 150) -> bytes:
-    """Return a figure as the bytes of a file, the same for the same figure, and close it."""
+    """Return a figure as the bytes of a file, the same for the same figure."""
     buffer = io.BytesIO()
-    metadata = {"Software": None} if form == "png" else {"Date": None}
-    figure.savefig(buffer, format=form, dpi=dpi, metadata=metadata)
-    pyplot().close(figure)
+    options = _PNG if form == "png" else {"metadata": {"Date": None}}
+    figure.savefig(buffer, format=form, dpi=dpi, **options)
     return buffer.getvalue()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mdfconv.distributions import distribution
-from mdfconv.output.figures import encoded, line_style, pyplot
+from mdfconv.output.figures import encoded, line_style, new_figure
 from mdfconv.paper.error_curves import Curves
 
 _SIZE = (7.2, 7.0)  # inches
@@ -32,8 +32,8 @@ def draw_errors(
     log : bool
         Whether (a) is logarithmic, for the tails.
     """
-    plt = pyplot()
-    figure, (upper, lower) = plt.subplots(2, 1, figsize=_SIZE, sharex=True)
+    figure = new_figure(*_SIZE)
+    upper, lower = figure.subplots(2, 1, sharex=True)
     for name, value in drawn.values.items():
         symbol = distribution(name).parameter.symbol
         label = f"{name}, {symbol} = {drawn.parameters[name]:.5g}"

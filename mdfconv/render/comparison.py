@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -167,22 +167,22 @@ class Comparison:
 
     def table(self) -> list[dict[str, Any]]:
         """Return for each picture its parameter and how far it is from the reference."""
+        displayed = self.reference.displayed(self.scene.exposure)
         return [
             {
                 "conversion": rule,
                 "distribution": substitute.name,
                 "parameter": substitute.parameter,
             }
-            | self._errors(substitute)
+            | self._errors(substitute, displayed)
             for rule, renderings in self.rows.items()
             for substitute in renderings
         ]
 
-    def _errors(self, substitute: Rendering) -> dict[str, float]:
+    def _errors(self, substitute: Rendering, displayed_reference: Array) -> dict[str, float]:
         image, reference = substitute.image, self.reference.image
-        exposure = self.scene.exposure
         linear = _rmse(image, reference)
-        displayed = _rmse(substitute.displayed(exposure), self.reference.displayed(exposure))
+        displayed = _rmse(substitute.displayed(self.scene.exposure), displayed_reference)
         return {
             "rmse_linear": linear,
             "psnr_linear": _psnr(linear),
@@ -231,20 +231,34 @@ def compare(
     }
     extent = float(lobe_extent(distribution(REFERENCE), np.asarray(legal)))
     position, normals = cross_section(_SECTION_POINTS, min(extent, 1.0))
-    reference = _render(REFERENCE, legal, scene, normals)
-    relative = _scale(reference)
-    rows = {
-        label: [relative(_render(name, value, scene, normals)) for name, value in pairs]
-        for label, pairs in converted.items()
+    substitutes = [pair for pairs in converted.values() for pair in pairs]
+    rendered = _render([(REFERENCE, legal), *substitutes], scene, normals)
+    relative = _scale(rendered[REFERENCE, legal])
+    shown = {pair: relative(one) for pair, one in rendered.items()}
+    rows = {label: [shown[pair] for pair in pairs] for label, pairs in converted.items()}
+    return Comparison(scene, shown[REFERENCE, legal], rows, position)
+
+
+def _render(
+    surfaces: Iterable[tuple[str, float]], scene: Scene, normals: Array
+) -> dict[tuple[str, float], Rendering]:
+    """Return pictures and sections by distribution and parameter, not yet relative to a peak.
+
+    All are drawn at once, as the directions are the same for all; and each but once.
+    """
+    distinct = list(dict.fromkeys(surfaces))
+    brdfs = [scene.surface(*pair) for pair in distinct]
+
+    def side_by_side(toward: Array, view: Array) -> Array:
+        return np.stack([brdf(toward, view) for brdf in brdfs])
+
+    light = LIGHTS[scene.light]
+    images = Frame(scene.size).render(side_by_side, light)
+    sections = radiance(normals, side_by_side, light)
+    return {
+        pair: Rendering(*pair, image, section)
+        for pair, image, section in zip(distinct, images, sections, strict=True)
     }
-    return Comparison(scene, relative(reference), rows, position)
-
-
-def _render(name: str, parameter: float, scene: Scene, normals: Array) -> Rendering:
-    """Return the picture and the section, both in colour and not yet relative to a peak."""
-    surface, light = scene.surface(name, parameter), LIGHTS[scene.light]
-    image = Frame(scene.size).render(surface, light)
-    return Rendering(name, parameter, image, radiance(normals, surface, light))
 
 
 def _scale(reference: Rendering) -> Callable[[Rendering], Rendering]:

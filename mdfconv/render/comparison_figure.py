@@ -3,22 +3,76 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdfconv.brdf.materials import material
 from mdfconv.distributions import distribution
+from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics.display import srgb
-from mdfconv.output.figures import encoded, line_style, pyplot
-from mdfconv.render.comparison import Comparison, Rendering, Scene
+from mdfconv.output.figures import encoded, line_style, new_figure, place_pixels
+from mdfconv.render.comparison import Comparison, Rendering
 from mdfconv.render.sphere import Frame
 
-_CELL = 1.62  # inches a picture
-_PLOT = 2.6
+# In inches. From the top of the sheet to its bottom: the heading, for each row of pictures the
+# caption, the picture and the gap, and the plot with the sections.
+_HEADING, _CAPTION, _GAP, _PLOT = 0.6, 0.36, 0.08, 2.6
+_PAD = 0.05  # above the heading, and between a caption and its picture
+_CELL = 1.9  # a picture, or as near as whole pixels allow
+_RULE = 0.3  # left of a row of pictures: its rule
 _NARROWEST = 6.4
+# From the edges of the plot to its axes.
+_LEFT, _RIGHT, _ABOVE, _BENEATH = 0.6, 0.14, 0.4, 0.45
 _LOWEST = 1e-3  # of the reference's peak: where the section is cut off
 _BACKGROUND = 0.05  # linear light, so that the silhouette shows
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where the pictures are on the sheet, in pixels from its upper left corner.
+
+    All of it is known beforehand. Matplotlib's layout engine would measure every text of dozens
+    of axes, which takes several times as long as to draw them.
+    """
+
+    rows: int
+    columns: int
+    size: int
+    dpi: int
+
+    @property
+    def zoom(self) -> int:
+        """How many pixels of the sheet, a side, show a pixel of a picture."""
+        return max(1, round(_CELL * self.dpi / self.size))
+
+    @property
+    def cell(self) -> int:
+        """The side of a picture."""
+        return self.zoom * self.size
+
+    @property
+    def width(self) -> int:
+        """The width of the sheet."""
+        pictures = _RULE * self.dpi + self.columns * (self.cell + _GAP * self.dpi)
+        return int(np.ceil(max(pictures, self.dpi * max(_PLOT * self.rows, _NARROWEST))))
+
+    @property
+    def height(self) -> int:
+        """The height of the sheet."""
+        return self.top(self.rows) + int((_PLOT - _CAPTION) * self.dpi)
+
+    def top(self, row: int) -> int:
+        """Return where the pictures of a row begin."""
+        captions = _HEADING + _CAPTION + row * (_CAPTION + _GAP)
+        return int(captions * self.dpi) + row * self.cell
+
+    def left(self, column: int) -> int:
+        """Return where the pictures of a column begin, each in the middle of its share."""
+        share = (self.width - _RULE * self.dpi) / self.columns
+        return int(_RULE * self.dpi + (column + 0.5) * share - 0.5 * self.cell)
 
 
 def draw_comparison(comparison: Comparison, dpi: int = 120) -> bytes:
@@ -31,42 +85,26 @@ def draw_comparison(comparison: Comparison, dpi: int = 120) -> bytes:
     dpi : int
         Resolution.
     """
-    plt = pyplot()
-    rows = list(comparison.rows.items())
-    columns = 1 + max(len(renderings) for _, renderings in rows)
-    # A pixel of the sheet shows at most a pixel of the picture.
-    cell = max(_CELL, comparison.scene.size / dpi)
-    width = max(cell * columns + 0.4, _PLOT * len(rows), _NARROWEST)
-    height = (cell + 0.42) * len(rows)
-    figure = plt.figure(figsize=(width, height + _PLOT + 0.6))
-    top, bottom = figure.subfigures(2, 1, height_ratios=(height, _PLOT))
-    figure.suptitle(_title(comparison), fontsize=10)
-    panels = top.subplots(len(rows), columns, squeeze=False)
-    for line, (rule, renderings) in zip(panels, rows, strict=True):
-        for axes in line:
-            axes.axis("off")
-        line[0].text(
-            -0.04, 0.5, rule, rotation=90, ha="right", va="center", transform=line[0].transAxes
-        )
-        for axes, rendering in zip(line, [comparison.reference, *renderings], strict=False):
-            _picture(axes, comparison.scene, rendering)
-    sections = bottom.subplots(1, len(rows), sharey=True, squeeze=False)[0]
-    for axes, (rule, renderings) in zip(sections, rows, strict=True):
-        _section(axes, comparison, renderings)
-        axes.set_title(rule, fontsize=8)
-    sections[0].set_ylabel(f"luminance / peak of {comparison.reference.name}", fontsize=8)
-    sections[0].legend(fontsize=6.5, loc="upper left", handlelength=2.4)
+    columns = 1 + max(len(renderings) for renderings in comparison.rows.values())
+    layout = _Layout(len(comparison.rows), columns, comparison.scene.size, dpi)
+    # Half a pixel more: the size is rounded down.
+    figure = new_figure((layout.width + 0.5) / dpi, (layout.height + 0.5) / dpi, layout=None)
+    figure.set_dpi(dpi)
+    _draw_pictures(figure, comparison, layout)
+    _draw_sections(figure, comparison, layout)
+    figure.suptitle(_title(comparison), fontsize=10, y=1 - _PAD * dpi / layout.height)
     return encoded(figure, dpi=dpi)
 
 
 def _title(comparison: Comparison) -> str:
     scene, reference = comparison.scene, comparison.reference
-    surface = f"{scene.brdf}, {material(scene.material).name}" if scene.material else scene.brdf
+    reflected = f"{material(scene.material).name}, " if scene.material else ""
     colored = reference.image.ndim == 3
     return (
-        f"{reference.name} {_parameter(reference)} and its substitutes: {surface},\n"
-        f"{scene.light} light, {'normalized' if scene.normalized else 'unit form'} D, exposure "
-        f"{scene.exposure:g} (1: the peak of {reference.name} is "
+        f"{reference.name} {_parameter(reference)} and its substitutes\n"
+        f"{scene.brdf}, {reflected}{scene.light} light, "
+        f"{'normalized' if scene.normalized else 'unit form'} D\n"
+        f"exposure {scene.exposure:g} (1: the peak of {reference.name} is "
         f"{'as bright as its colour can be' if colored else 'white'})"
     )
 
@@ -76,13 +114,54 @@ def _parameter(rendering: Rendering) -> str:
     return f"{symbol} = {rendering.parameter:.4g}"
 
 
-def _picture(axes: Any, scene: Scene, rendering: Rendering) -> None:
-    coverage = Frame(scene.size).normals()[1].reshape(scene.size, scene.size)
-    shown = srgb(scene.exposure * rendering.image + (1 - coverage) * _BACKGROUND)
-    # Matplotlib has the channels last; a grey picture has none.
-    shown = np.moveaxis(shown, 0, -1) if shown.ndim == 3 else shown
-    axes.imshow(shown, cmap="gray", vmin=0, vmax=1, interpolation="antialiased")
-    axes.set_title(f"{rendering.name}\n{_parameter(rendering)}", fontsize=7.5, pad=3)
+def _draw_pictures(figure: Any, comparison: Comparison, layout: _Layout) -> None:
+    """Draw the pictures as one image, pixel for pixel, with their captions and rules."""
+    sheet = np.full((layout.height, layout.width, 4), 255, np.uint8)
+    coverage = Frame(layout.size).normals()[1].reshape(layout.size, layout.size)
+    background = (1 - coverage) * _BACKGROUND
+
+    def write(x: float, y: float, text: str, **style: Any) -> None:
+        figure.text(x / layout.width, 1 - y / layout.height, text, ha="center", **style)
+
+    for row, (rule, renderings) in enumerate(comparison.rows.items()):
+        top, bottom = layout.top(row), layout.top(row) + layout.cell
+        write(0.5 * _RULE * layout.dpi, 0.5 * (top + bottom), rule, rotation=90, va="center")
+        for column, rendering in enumerate([comparison.reference, *renderings]):
+            left, right = layout.left(column), layout.left(column) + layout.cell
+            caption = f"{rendering.name}\n{_parameter(rendering)}"
+            write(0.5 * (left + right), top - _PAD * layout.dpi, caption, va="bottom", fontsize=7.5)
+            shown = _bytes(comparison.scene.exposure * rendering.image + background)
+            sheet[top:bottom, left:right, :3] = shown.repeat(layout.zoom, 0).repeat(layout.zoom, 1)
+    place_pixels(figure, sheet)
+
+
+def _bytes(light: Array) -> NDArray[np.uint8]:
+    """Return linear light as a screen takes it, the channels last; a grey picture has one."""
+    encoding = np.rint(255 * srgb(light.astype(np.float32))).astype(np.uint8)
+    return np.moveaxis(encoding, 0, -1) if light.ndim == 3 else encoding[..., None]
+
+
+def _draw_sections(figure: Any, comparison: Comparison, layout: _Layout) -> None:
+    """Draw the sections side by side, on one scale."""
+    width, height = layout.width / layout.dpi, layout.height / layout.dpi
+    sections = figure.subplots(
+        1,
+        layout.rows,
+        sharey=True,
+        squeeze=False,
+        gridspec_kw={
+            "left": _LEFT / width,
+            "right": 1 - _RIGHT / width,
+            "top": (_PLOT - _ABOVE) / height,
+            "bottom": _BENEATH / height,
+            "wspace": 0.06,
+        },
+    )[0]
+    for axes, (rule, renderings) in zip(sections, comparison.rows.items(), strict=True):
+        _section(axes, comparison, renderings)
+        axes.set_title(rule, fontsize=8)
+    sections[0].set_ylabel(f"luminance / peak of {comparison.reference.name}", fontsize=8)
+    sections[0].legend(fontsize=6.5, loc="upper left", handlelength=2.4)
 
 
 def _section(axes: Any, comparison: Comparison, renderings: Sequence[Rendering]) -> None:
@@ -93,3 +172,5 @@ def _section(axes: Any, comparison: Comparison, renderings: Sequence[Rendering])
     for rendering in [reference, *renderings]:
         axes.plot(position, rendering.section, label=rendering.name, **line_style(rendering.name))
     axes.set_xlabel("towards the light [radii]", fontsize=8)
+    # A label at the very end would reach into the next section.
+    axes.locator_params(axis="x", prune="both")

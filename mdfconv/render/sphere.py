@@ -20,7 +20,7 @@ _AREA_HALF_SIDE = 0.15  # of the distance to the square light
 _AREA_SAMPLES = 8  # a side
 _MARGIN = 1.04  # half the picture, in radii
 # Some twenty vectors for each normal, as many as this, stay in the cache.
-_NORMALS_AT_ONCE = 4096
+_NORMALS_AT_ONCE = 8192
 
 
 @dataclass(frozen=True)
@@ -65,14 +65,14 @@ def radiance(normals: Array, brdf: Brdf, light: Lights) -> Array:
     normals : numpy.ndarray, shape (n, 3)
         Unit normals; where one turns away from the viewer the result is 0.
     brdf : callable
-        The BRDF, of directions in the frames of the normals.
+        The BRDF, of directions in the frames of the normals; or several, stacked.
     light : Lights
         Where the light comes from.
 
     Returns
     -------
     numpy.ndarray, shape (n,), or (3, n) in colour
-        Radiance in units of irradiance per steradian.
+        Radiance in units of irradiance per steradian; of several BRDFs they come first.
     """
     blocks = np.array_split(normals, max(1, len(normals) // _NORMALS_AT_ONCE))
     return np.concatenate([_radiance(block, brdf, light) for block in blocks], axis=-1)
@@ -120,7 +120,8 @@ class Frame:
     def render(self, brdf: Brdf, light: Lights) -> Array:
         """Return the picture in linear light, black around the sphere.
 
-        Its shape is (size, size), or (3, size, size) in colour.
+        Its shape is (size, size), or (3, size, size) in colour; of several BRDFs they come
+        first.
         """
         normals, coverage = self.normals()
         inside = np.flatnonzero(coverage)

@@ -5,8 +5,12 @@ A new artefact is a function that returns an `Artefact`, and one entry in `_ARTE
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from typing import TypeAlias
 
 from mdfconv.errors import MdfconvError
 from mdfconv.output.files import file_bytes, write_files
@@ -20,7 +24,9 @@ from mdfconv.reports.lights_page import lights_page
 from mdfconv.reports.method_page import method_page
 from mdfconv.reports.stability_page import stability_page
 
-_ARTEFACTS: tuple[Callable[[], Artefact], ...] = (
+_Make: TypeAlias = Callable[[], Artefact]
+
+_ARTEFACTS: tuple[_Make, ...] = (
     paper_pages.table2,
     paper_pages.other_metrics,
     paper_pages.closed_forms,
@@ -34,17 +40,22 @@ _ARTEFACTS: tuple[Callable[[], Artefact], ...] = (
     stability_page,
 )
 COUNT = len(_ARTEFACTS)
+# They are begun first, so that no process ends long after the others.
+_LONGEST = (furnace_page, stability_page, method_page)
 # Times cannot be reproduced: these are made by `mdfconv bench`, and only listed here.
 MEASURED = ("speed-error.md", "speed-error.csv", "speed-error.png")
 
 
-def build(folder: Path) -> Iterator[Artefact]:
+def build(folder: Path, processes: int | None = None) -> Iterator[Artefact]:
     """Write the report into a folder, yielding each artefact as it is written.
 
     Parameters
     ----------
     folder : Path
         Created if its parent exists.
+    processes : int, optional
+        How many make artefacts at a time; as many as there are processors by default. With 1
+        all are made in the caller's own.
 
     Raises
     ------
@@ -56,13 +67,29 @@ def build(folder: Path) -> Iterator[Artefact]:
     except OSError as error:
         raise MdfconvError(f"cannot create {folder}: {error.strerror}") from None
     artefacts = []
-    for make in _ARTEFACTS:
-        artefact = make()
+    for artefact in _made(processes or min(os.cpu_count() or 1, COUNT)):
         write_files({folder / name: content for name, content in artefact.files.items()})
         artefacts.append(artefact)
         yield artefact
     measured = [name for name in MEASURED if (folder / name).exists()]
     write_files({folder / "README.md": file_bytes(_index(artefacts, measured))})
+
+
+def _made(processes: int) -> Iterator[Artefact]:
+    """Yield the artefacts in the order of the index."""
+    if processes == 1:
+        yield from (make() for make in _ARTEFACTS)
+        return
+    # An interrupt from a terminal reaches every process: those of the pool end at once, unheard.
+    pool = ProcessPoolExecutor(
+        processes, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_DFL)
+    )
+    try:
+        begun = {make: pool.submit(make) for make in dict.fromkeys([*_LONGEST, *_ARTEFACTS])}
+        for make in _ARTEFACTS:
+            yield begun[make].result()
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def _index(artefacts: Sequence[Artefact], measured: Sequence[str]) -> str:

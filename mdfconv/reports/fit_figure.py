@@ -6,7 +6,7 @@ import numpy as np
 
 from mdfconv.measured.lobe_fit import LobeFit
 from mdfconv.measured.samples import Samples
-from mdfconv.output.figures import PAGE, encoded, line_style, pyplot
+from mdfconv.output.figures import PAGE, encoded, line_style, new_figure
 
 _POINTS = 600  # of a curve, one a pixel
 
@@ -23,10 +23,8 @@ def draw_fits(data: Samples, fits: list[LobeFit], title: str) -> bytes:
     title : str
         What was measured.
     """
-    plt = pyplot()
-    figure, (upper, lower) = plt.subplots(
-        2, 1, figsize=PAGE, sharex=True, height_ratios=(3, 2), layout="constrained"
-    )
+    figure = new_figure(*PAGE)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     degrees = np.degrees(data.beta)
     beta = np.linspace(data.beta[0], data.beta[-1], _POINTS)
     upper.plot(degrees, data.values[:, 0], "o", color="0.6", markersize=3, label="data")

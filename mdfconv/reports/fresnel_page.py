@@ -11,7 +11,7 @@ import numpy as np
 from mdfconv.brdf.fresnel import SMOOTHIE_FIT
 from mdfconv.brdf.fresnel_fit import EDGES, FresnelFit, fit, grid, rescaled
 from mdfconv.distributions.evaluation import Array
-from mdfconv.output.figures import PAGE, encoded, pyplot
+from mdfconv.output.figures import PAGE, encoded, new_figure
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text, markdown_text, rounded_rows
 from mdfconv.reports.artefact import Artefact
@@ -106,7 +106,8 @@ def draw_fresnel(fitted: FresnelFit, dpi: int = 110) -> bytes:
     dpi : int
         Resolution.
     """
-    figure, (left, right) = pyplot().subplots(1, 2, figsize=(PAGE[0] * 1.35, PAGE[1] * 0.85))
+    figure = new_figure(PAGE[0] * 1.35, PAGE[1] * 0.85)
+    left, right = figure.subplots(1, 2)
     cosine = grid()
     iors = dict.fromkeys([*_DRAWN_IORS, fitted.ior])
     for ior, drawn in zip(iors, _EXACT_STYLES, strict=False):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from mdfconv.output.figures import PAGE, encoded, pyplot
+from mdfconv.output.figures import PAGE, encoded, new_figure
 
 Curves = Mapping[str, Sequence[float]]
 
@@ -21,11 +21,11 @@ def draw_albedo(cosine: Sequence[float], panels: Mapping[str, Curves], dpi: int 
     dpi : int
         Resolution.
     """
-    plt = pyplot()
     rows = (len(panels) + 1) // 2
     columns = min(2, len(panels))
-    size = (PAGE[0] * (1.45 if columns > 1 else 1), PAGE[1] * 0.72 * rows + 0.6)
-    figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False)
+    width = PAGE[0] * (1.45 if columns > 1 else 1)
+    figure = new_figure(width, PAGE[1] * 0.72 * rows + 0.6)
+    axes = figure.subplots(rows, columns, squeeze=False)
     dashes = ["-", (0, (5, 2)), (0, (5, 2, 1, 2)), (0, (1, 1.5)), (0, (8, 2)), (0, (3, 3))]
     for axis in axes.flat[len(panels) :]:
         axis.set_visible(False)

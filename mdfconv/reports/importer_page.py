@@ -11,7 +11,7 @@ from mdfconv.conversion.endpoint import endpoints
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.formula import Problem, cheapest
-from mdfconv.output.figures import PAGE, encoded, pyplot
+from mdfconv.output.figures import PAGE, encoded, new_figure
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text, markdown_text, rounded_rows
 from mdfconv.reports.artefact import Artefact
@@ -105,8 +105,8 @@ def _shown(row: dict[str, float]) -> dict[str, Any]:
 
 
 def _draw(curves: dict[str, Array]) -> bytes:
-    plt = pyplot()
-    figure, (left, right) = plt.subplots(1, 2, figsize=(PAGE[0] * 1.35, PAGE[1] * 0.85))
+    figure = new_figure(PAGE[0] * 1.35, PAGE[1] * 0.85)
+    left, right = figure.subplots(1, 2)
     for name, (color, dashes) in _STYLES.items():
         label = name if name in IMPORTER_RULES else f"mdfconv, {name}"
         style = {"color": color, "linestyle": dashes, "linewidth": 1.4}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
-from mdfconv.output.figures import PAGE, encoded, pyplot
+from mdfconv.output.figures import PAGE, encoded, new_figure
 from mdfconv.reports.power_law import best_ratio
 from mdfconv.reports.renders import FLIP, LINEAR, Renders
 
@@ -41,7 +41,8 @@ def draw_lights(
     dpi : int
         Resolution.
     """
-    figure, (left, right) = pyplot().subplots(1, 2, figsize=(PAGE[0] * 1.5, PAGE[1] * 0.95))
+    figure = new_figure(PAGE[0] * 1.5, PAGE[1] * 0.95)
+    left, right = figure.subplots(1, 2)
     curve = [best_ratio(exponent) for exponent in _EXPONENTS]
     handles = left.plot(_EXPONENTS, curve, color="#000000", label="pure power law, smooth surface")
     for name, ratio in metrics.items():

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.benchmark.methods import answers, as_wide, covering
+from mdfconv.benchmark.methods import answers, as_wide
+from mdfconv.conversion import list_methods, method_named
 from mdfconv.conversion.method import Method
 from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions import Distribution, one_parameter_distributions
@@ -58,33 +59,60 @@ def method_page() -> Artefact:
 
 
 def _compare(pairs: Sequence[_Pair]) -> _Errors:
-    errors: _Errors = {}
-    for widths, m_b in _RANGES.items():
-        for metric in map(metric_named, list_metrics()):
-            for pair in pairs:
-                parameter = as_wide(m_b, pair[0])
-                parameter = parameter[~np.isnan(parameter)]
-                methods = {method.name: method for method in covering(*pair, metric)}
-                reference = next(methods[name] for name in _REFERENCES if name in methods)
-                best = _results_and_rmse(reference, parameter, pair, metric)
-                for name, method in methods.items():
-                    if not method.follows_metric:
-                        ours = _results_and_rmse(method, parameter, pair, metric)
-                        off = np.stack([np.abs(ours[0] / best[0] - 1), ours[1] - best[1]])
-                        errors.setdefault((widths, metric.name, name), {})[pair] = off
-    return errors
-
-
-def _results_and_rmse(method: Method, parameter: Array, pair: _Pair, metric: Metric) -> Array:
-    """Return the results of a method and the RMSE that they leave, shape (2, n)."""
-    source, target = pair
-    result = answers(method, parameter, source, target, metric)
-    answered = ~np.isnan(result)
-    rmse = np.full_like(result, np.nan)
-    rmse[answered], _ = remaining_error(
-        source, parameter[answered], target, result[answered], metric
+    """Return the errors of all formulas, each of which answers once for a pair."""
+    formulas = sorted(
+        (method for method in list_methods() if not method.follows_metric),
+        key=lambda method: method.name,
     )
-    return np.stack([result, rmse])
+    metrics = [metric_named(name) for name in list_metrics()]
+    errors: _Errors = {
+        (widths, metric.name, method.name): {}
+        for widths in _RANGES
+        for metric in metrics
+        for method in formulas
+    }
+    parameters = {source: _parameters(source) for source in dict(pairs)}
+    for source, target in pairs:
+        parameter, within = parameters[source]
+        covering = [method for method in formulas if method.covers(source, target, metrics[0])]
+        ours = [answers(method, parameter, source, target, metrics[0]) for method in covering]
+        for metric in metrics:
+            best = answers(_reference(source, target, metric), parameter, source, target, metric)
+            results = np.stack([best, *ours])
+            rmse = _rmse(source, parameter, target, results, metric)
+            for method, off, excess in zip(
+                covering, np.abs(results[1:] / best - 1), rmse[1:] - rmse[0], strict=True
+            ):
+                for widths, rows in within.items():
+                    errors[widths, metric.name, method.name][source, target] = np.stack(
+                        [off[rows], excess[rows]]
+                    )
+    return {key: group for key, group in errors.items() if group}
+
+
+def _parameters(source: Distribution) -> tuple[Array, dict[str, slice]]:
+    """Return the parameters of all lobes that a distribution has, and those of each range."""
+    groups = [as_wide(m_b, source) for m_b in _RANGES.values()]
+    groups = [group[~np.isnan(group)] for group in groups]
+    ends = np.cumsum([group.size for group in groups])
+    rows = [slice(end - group.size, end) for group, end in zip(groups, ends, strict=True)]
+    return np.concatenate(groups), dict(zip(_RANGES, rows, strict=True))
+
+
+def _reference(source: Distribution, target: Distribution, metric: Metric) -> Method:
+    methods = [method_named(name) for name in _REFERENCES]
+    return next(method for method in methods if method.covers(source, target, metric))
+
+
+def _rmse(
+    source: Distribution, parameter: Array, target: Distribution, results: Array, metric: Metric
+) -> Array:
+    """Return the RMSE that results leave, NaN where there is none; both have shape (k, n)."""
+    answered = ~np.isnan(results)
+    sources = np.broadcast_to(parameter, results.shape)[answered]
+    rmse = np.full_like(results, np.nan)
+    rmse[answered], _ = remaining_error(source, sources, target, results[answered], metric)
+    return rmse
 
 
 def _row(key: tuple[str, str, str], group: Sequence[Array]) -> dict[str, Any]:

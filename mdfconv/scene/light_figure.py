@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mdfconv.light.spectrum import FIRST_OF_LAW, Spectrum
-from mdfconv.output.figures import PAGE, encoded, pyplot
+from mdfconv.output.figures import PAGE, encoded, new_figure
 
 _GUIDES = ((0.0, "a sun: l⁰", ":"), (2.0, "nature: l⁻²", "--"))
 
@@ -22,8 +22,8 @@ def draw_spectrum(spectrum: Spectrum, title: str, dpi: int = 150) -> bytes:
     dpi : int
         Resolution.
     """
-    plt = pyplot()
-    figure, panel = plt.subplots(figsize=PAGE)
+    figure = new_figure(*PAGE)
+    panel = figure.subplots()
     degree = np.arange(1, spectrum.highest + 1)
     power = spectrum.power[1:]
     panel.plot(degree, power, color="#0072B2", linewidth=0.9, label="the light")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mdfconv.output.figures import PAGE, encoded, line_style, pyplot
+from mdfconv.output.figures import PAGE, encoded, line_style, new_figure
 from mdfconv.scene.texture_map import BINS, TextureReport
 
 
@@ -20,8 +20,8 @@ def draw_histograms(report: TextureReport, title: str, dpi: int = 150) -> bytes:
     dpi : int
         Resolution.
     """
-    plt = pyplot()
-    figure, panels = plt.subplots(2, 1, figsize=PAGE, sharex=True, sharey=True)
+    figure = new_figure(*PAGE)
+    panels = figure.subplots(2, 1, sharex=True, sharey=True)
     edges = np.linspace(0, 1, BINS + 1)
     histograms = (report.source, report.before), (report.target, report.after)
     for panel, (name, counts) in zip(panels, histograms, strict=True):

@@ -20,7 +20,7 @@ from mdfconv.benchmark.timing import Sizes, interleave, spread
 from mdfconv.conversion import method_named
 from mdfconv.distributions import one_parameter_distributions
 from mdfconv.fitting.metrics import list_metrics, metric_named
-from mdfconv.output.figures import pyplot
+from mdfconv.output.figures import PAGE, new_figure
 from mdfconv.output.labels import place_labels
 from tests.cli.runner import run, run_on_terminal
 
@@ -203,7 +203,8 @@ def test_interleaving_counts_rounds_but_the_first():
 
 
 def test_labels_keep_out_of_each_others_way():
-    figure, axes = pyplot().subplots()
+    figure = new_figure(*PAGE)
+    axes = figure.subplots()
     x, y = [1.0, 1.05, 1.001, 3.0], [1.0, 1.0, 1.0, 2.0]
     axes.plot(x, y, "o")
     figure.canvas.draw()
@@ -212,4 +213,3 @@ def test_labels_keep_out_of_each_others_way():
     assert [text.get_text() for text in axes.texts] == ["one, three", "two", "four"]
     boxes = [text.get_window_extent() for text in axes.texts]
     assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
-    pyplot().close(figure)

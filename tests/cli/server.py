@@ -19,7 +19,7 @@ from importlib import import_module
 # Of mdfconv itself only what every run imports: a command shows whether its own imports suffice.
 IMPORTS = (
     "matplotlib.backends.backend_agg",
-    "matplotlib.pyplot",
+    "matplotlib.figure",
     "mdfconv.cli",
     "numpy",
     "PIL.PngImagePlugin",

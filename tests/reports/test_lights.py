@@ -4,9 +4,10 @@ import mpmath as mp
 import numpy as np
 import pytest
 from scipy.special import k1
+from scipy.stats import spearmanr
 
 import mdfconv
-from mdfconv.reports.lights_page import cost_table, prediction_error
+from mdfconv.reports.lights_page import cost_table, prediction_error, rank_correlation
 from mdfconv.reports.power_law import best_ratio, equivalent_exponent
 from mdfconv.reports.renders import RULES, read_renders
 from mdfconv.reports.smooth_constants import smooth_constants
@@ -46,6 +47,13 @@ def test_prediction():
     median, most = prediction_error(renders)
     assert round(100 * median, 1) == 2.6
     assert round(100 * most) == 11
+
+
+def test_rank_correlation():
+    renders = read_renders()
+    for best in renders.best.values():  # with ties
+        expected = spearmanr(renders.predicted, best).statistic
+        assert rank_correlation(renders.predicted, best) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(("ratio", "rule"), RULES.items())

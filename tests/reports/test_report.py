@@ -1,12 +1,16 @@
 """The report folder: what is committed is what the code makes, and the same twice."""
 
+import multiprocessing
 import shutil
 from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
 
+from mdfconv.errors import MdfconvError
+from mdfconv.reports import build as report
 from mdfconv.reports.build import MEASURED, build
+from mdfconv.reports.paper_pages import other_metrics, table2
 from tests.cli.runner import run
 
 REPORTS = Path(__file__).parents[2] / "reports"
@@ -22,7 +26,7 @@ def folder(tmp_path_factory):
         shutil.copy(REPORTS / name, path)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"a picture"))
-        for _ in build(path):
+        for _ in build(path, processes=1):
             pass
     return path
 
@@ -71,3 +75,28 @@ def test_a_folder_that_cannot_be(tmp_path):
     status, _, err = run("report", "--output", tmp_path / "no" / "folder")
     assert status == 2
     assert "cannot create" in err
+
+
+def refuse():
+    raise MdfconvError("no such light", "there are two", argument="light")
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_an_artefact_that_cannot_be(processes, tmp_path, monkeypatch):
+    monkeypatch.setattr(report, "_LONGEST", ())
+    monkeypatch.setattr(report, "_ARTEFACTS", (table2, refuse, table2))
+    written = build(tmp_path, processes)
+    assert set(next(written).files) == {path.name for path in tmp_path.iterdir()}
+    with pytest.raises(MdfconvError, match="no such light; there are two") as caught:
+        next(written)
+    assert caught.value.argument == "light"
+    assert multiprocessing.active_children() == []
+
+
+def test_processes_take_turns_and_keep_the_order(tmp_path, monkeypatch):
+    monkeypatch.setattr(report, "_LONGEST", (table2,))
+    monkeypatch.setattr(report, "_ARTEFACTS", (other_metrics, table2))
+    names = [next(iter(artefact.files)) for artefact in build(tmp_path, 2)]
+    assert names == ["table2-energy.csv", "table2.csv"]
+    index = (tmp_path / "README.md").read_text()
+    assert index.index("table2-energy.csv") < index.index("[table2.csv]")

@@ -11,6 +11,7 @@ from mdfconv.conversion.endpoint import Endpoint, endpoints
 from mdfconv.conversion.method import Method
 from mdfconv.conversion.methods import default_method, method_named
 from mdfconv.conversion.refusals import check_covered, check_pair, unreachable
+from mdfconv.conversion.threads import in_threads
 from mdfconv.distributions.equivalence import exact_route, follow
 from mdfconv.distributions.evaluation import Array, Mask, as_operand
 from mdfconv.distributions.parameter import number_text
@@ -29,6 +30,7 @@ def convert(
     *,
     metric: str | Metric | None = None,
     gamma: Gamma = None,
+    threads: int = 1,
 ) -> Any:
     """Convert a parameter from one distribution to another.
 
@@ -52,6 +54,8 @@ def convert(
     gamma : float or "free", optional
         The second parameter, on either side that has one; its default if not given. ``"free"``
         fits that of the target along with the first.
+    threads : int, optional
+        How many share the work on an array of a million values or more. The results are the same.
 
     Returns
     -------
@@ -86,14 +90,14 @@ def convert(
         if isinstance(gamma, str):
             results = apply_free(kept, ends[0].decode(operand), *ends)
             return tuple(_like(array, operand) for array in results[:2])
-        return _convert(operand, rule, kept, *ends)
+        return _convert(operand, rule, kept, *ends, threads)
     check_pair(values, *ends)
     x, y = (as_operand(axis) for axis in values)
     try:
         np.broadcast_shapes(np.shape(x), np.shape(y))
     except ValueError:
         raise MdfconvError(f"shapes {np.shape(x)} and {np.shape(y)} are not a pair") from None
-    return _convert(x, rule, kept, *ends), _convert(y, rule, kept, *ends)
+    return _convert(x, rule, kept, *ends, threads), _convert(y, rule, kept, *ends, threads)
 
 
 def given_gamma(gamma: Gamma) -> float | None:
@@ -184,14 +188,22 @@ def _check_results(
 
 
 def _convert(
-    operand: Any, method: Method, metric: Metric, source: Endpoint, target: Endpoint
+    operand: Any, method: Method, metric: Metric, source: Endpoint, target: Endpoint, threads: int
 ) -> Any:
     """Convert an operand, in its shape and floating type."""
-    if method.gaps_as_nan and np.ndim(operand):
-        stored = _apply_with_gaps(method, metric, operand, source, target)
-    else:
-        stored = target.encode(apply(method, metric, source.decode(operand), source, target))
-    return _like(stored, operand)
+    with_gaps = method.gaps_as_nan and np.ndim(operand) > 0
+    if with_gaps and exact_route(source.distribution, target.distribution) is None:
+        check_covered(method, metric, source, target)
+
+    def stored(values: Any) -> Array:
+        if with_gaps:
+            return _apply_with_gaps(method, metric, values, source, target)
+        return target.encode(apply(method, metric, source.decode(values), source, target))
+
+    results = in_threads(stored, operand, threads)
+    if with_gaps:
+        _warn_of_gaps(method, operand, results, source, target)
+    return _like(results, operand)
 
 
 def _like(result: Array, operand: Any) -> Any:
@@ -209,28 +221,30 @@ def _like(result: Array, operand: Any) -> Any:
 def _apply_with_gaps(
     method: Method, metric: Metric, operand: Array, source: Endpoint, target: Endpoint
 ) -> Array:
-    """Convert an array; NaN, with one warning, where there is no answer."""
-    values = np.asarray(operand, dtype=np.float64)
+    """Convert an array; NaN where there is no answer."""
     exact = exact_route(source.distribution, target.distribution)
-    if exact is None:
-        check_covered(method, metric, source, target)
     with np.errstate(all="ignore"):
-        parameter = source.decode_legal(values)
+        parameter = source.decode_legal(np.asarray(operand, dtype=np.float64))
         if exact is not None:
             result = follow(exact, parameter)
         else:
             pair = source.distribution, target.distribution
             result = method.convert(parameter, *pair, metric)
     stored = target.encode(result)
-    answered = target.distribution.parameter.accepts(result) & ~np.isnan(stored)
-    if answered.all():
-        return stored
-    first = int(np.argmin(answered))
-    missing = answered.size - int(np.count_nonzero(answered))
+    legal = target.distribution.parameter.accepts(result)
+    return stored if legal.all() else np.where(legal, stored, np.nan)
+
+
+def _warn_of_gaps(
+    method: Method, operand: Array, stored: Array, source: Endpoint, target: Endpoint
+) -> None:
+    missing = np.isnan(stored)
+    if not missing.any():
+        return
+    first = float(operand.flat[int(np.argmax(missing))])
     warnings.warn(
-        f"{missing} of {values.size} values have no answer by {method.name} from {source.label} "
-        f"to {target.label} and are NaN, the first is {number_text(float(values.flat[first]))}",
+        f"{np.count_nonzero(missing)} of {missing.size} values have no answer by {method.name} "
+        f"from {source.label} to {target.label} and are NaN, the first is {number_text(first)}",
         MdfconvWarning,
         stacklevel=4,
     )
-    return np.where(answered, stored, np.nan)

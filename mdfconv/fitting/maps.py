@@ -23,8 +23,9 @@ from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.metrics.base import scaled
 
 FILE = Path(__file__).parent / "data" / "maps.npz"
-# So many values and their intermediates stay in the cache.
-_BLOCK = 8192
+# So many values and their intermediates stay in the cache; fewer would be computed no sooner, and
+# threads would wait for each other between them.
+_BLOCK = 131072
 
 
 @dataclass(frozen=True)

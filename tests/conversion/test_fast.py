@@ -129,6 +129,25 @@ def test_the_data_are_what_the_script_makes(key):
     assert made(x) == pytest.approx(stored(x), rel=2e-7)
 
 
+@pytest.mark.parametrize("method", ["fast", None])
+def test_threads_change_nothing(method):
+    values = np.random.default_rng(7).uniform(0.01, 0.99, (1100, 1000)).astype(np.float32)
+    pair = "beckmann", "ggx", method
+    alone = mdfconv.convert(values, *pair, metric="energy")
+    shared = mdfconv.convert(values, *pair, metric="energy", threads=3)
+    assert shared.dtype == np.float32
+    np.testing.assert_array_equal(shared, alone)
+    values[700, 3] = -1
+    if method:
+        with pytest.warns(mdfconv.MdfconvWarning, match="1 of 1100000 values .* the first is -1"):
+            mdfconv.convert(values, *pair, metric="energy", threads=2)
+    else:
+        with pytest.raises(mdfconv.MdfconvError, match="value 700004 of 1100000"):
+            mdfconv.convert(values, *pair, metric="energy", threads=2)
+    with pytest.raises(mdfconv.MdfconvError, match="0 threads: at least 1"):
+        mdfconv.convert(values, *pair, metric="energy", threads=0)
+
+
 def test_the_data_are_small():
     assert maps.FILE.stat().st_size < 200_000
 

@@ -1,0 +1,53 @@
+"""Large arrays in parts, by several threads: NumPy lets others run while it computes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+
+# Smaller arrays are converted sooner than threads are started.
+_WORTH_IT = 1 << 20
+_PARTS_A_THREAD = 4
+
+
+def in_threads(function: Callable[[Any], Array], values: Any, threads: int) -> Array:
+    """Return an elementwise function of a large array, computed in parts by threads.
+
+    Parameters
+    ----------
+    function : callable
+        From an array to one of floats in its shape.
+    values : float or numpy.ndarray
+        A small array, and a number, is computed at once.
+    threads : int
+        How many run at a time, from 1.
+
+    Raises
+    ------
+    MdfconvError
+        If the number of threads makes no sense, or as the function does for all of the values.
+    """
+    if threads < 1:
+        raise MdfconvError(f"{threads} threads: at least 1")
+    size = np.size(values)
+    if threads == 1 or size < _WORTH_IT:
+        return function(values)
+    flat, result = values.reshape(-1), np.empty(size)
+    ends = np.linspace(0, size, threads * _PARTS_A_THREAD + 1).astype(int).tolist()
+
+    def compute(low: int, high: int) -> None:
+        result[low:high] = function(flat[low:high])
+
+    try:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(compute, ends[:-1], ends[1:]))
+    except MdfconvError:
+        # What is wrong is said of all the values, not of a part.
+        return function(values)
+    return result.reshape(values.shape)

@@ -35,9 +35,9 @@ _MOST_LEFT, _ROUNDING = 0.9, 1e-7
 # With more values than knots, those between knots start from a curve through the knots' fits. What
 # ends far above their distances has missed the lowest minimum.
 _KNOTS, _LEAST_KNOTS, _AS_USUAL = 64, 4, 1.05
-# From the hemisphere to samples of a part of it a fit moves by some per cent, from a few of them to
-# all by some per mille.
-_DESCENTS_ON_FEW, _LARGEST_FROM_FEW = 3, 1e-2
+# From the hemisphere to samples of a part of it a fit moves by some per cent, from some of them to
+# all by 1e-7 and so that one step is enough.
+_DESCENTS_ON_FEW, _LARGEST_FROM_FEW = 2, 1e-6
 # Of the ends of a plateau, between which all lobes are clipped as a whole, the last.
 _AS_LOW = 1 + 1e-9
 # The coarse distance at an end of the scan is right to a per cent or so.
@@ -193,8 +193,9 @@ def _on_samples(
         if not target.parameter.accepts(near).all():
             return nowhere
         problem = near_problem(source, parameter, target, near, metric, quadrature)
-        best, distance = descend(problem, near)
-        stays = np.abs(np.log(best / near)) <= _LARGEST_FROM_FEW
+        step, distance = problem.step(np.log(near))
+        best = near * np.exp(step)
+        stays = np.abs(step) <= _LARGEST_FROM_FEW
     best = np.where(stays & target.parameter.accepts(best), best, np.nan)
     return _with_limits(best, distance, target)
 
@@ -208,10 +209,10 @@ class _Few:
     def nodes(
         self, rows: Indices, kinks: Array | None = None, edges: Array | None = None
     ) -> tuple[Array, Array]:
-        return self._quadrature.coarse(rows)
+        return self._quadrature.coarse(rows, fine=True)
 
     def coarse(self, rows: Indices, *, fine: bool = False) -> tuple[Array, Array]:
-        return self._quadrature.coarse(rows)
+        return self._quadrature.coarse(rows, fine=fine)
 
 
 def _between_knots(

@@ -164,6 +164,8 @@ class Problem:
     def _samples_for(self, parameter: Array, index: Indices) -> tuple[Array, Array, Array]:
         """Return angles, weights and the source's signal for parameters of the target."""
         if self._samples is not None:
+            if index.size == self.size:
+                return self._samples
             beta, weight, signal = (array[index] for array in self._samples)
             return beta, weight, signal
         theirs = (part if part is None else part[index] for part in self._source_breaks)

@@ -15,7 +15,7 @@ _NARROWEST = 1e-3
 _HORIZON_PANELS = 14
 # Nodes a panel: 12 leave nothing to be seen in a fit, 4 tell its neighbourhood.
 _ORDER, _SCAN_ORDER = 12, 4
-_SCAN_SAMPLES = 40
+_SCAN_SAMPLES, _FINE_SAMPLES = 40, 300
 # An encoding for a screen rises like a root where a distribution leaves 0: panels that shrink
 # by 4 towards the edge resolve it to 1e-6 of the lobe.
 _TOWARDS_EDGE = 1 - np.append(0.25 ** np.arange(1, 10), 0)
@@ -147,7 +147,14 @@ class UniformSamples:
         return beta, np.broadcast_to(1.0, beta.shape)
 
     def coarse(self, rows: Indices, *, fine: bool = False) -> tuple[Array, Array]:
-        """Return a few of the samples, with the weight of all."""
-        count = self._beta.shape[1]
-        beta = self._beta[rows, :: max(1, count // _SCAN_SAMPLES)]
-        return beta, np.full_like(beta, count / beta.shape[1])
+        """Return some of the samples, weighted so that their sum is that of all.
+
+        By the trapezoidal rule for both, up to slopes at the ends (Euler-Maclaurin).
+        """
+        last = self._beta.shape[1] - 1
+        longest = max(1, last // (_FINE_SAMPLES if fine else _SCAN_SAMPLES))
+        step = next(step for step in range(longest, 0, -1) if last % step == 0)
+        beta = self._beta[rows, ::step]
+        weight = np.full_like(beta, step)
+        weight[:, [0, -1]] = 0.5 * (step + 1)
+        return beta, weight

@@ -31,7 +31,7 @@ _LEGENDS = {
     "uses, from equal half angles. fit starts from the stored fits; cold fit: without them, by a "
     "scan.",
     "scaling": "Nanoseconds a value, of one call for an array of so many values, under {metric}; "
-    "empty where a call would take longer than {patience:g} s.",
+    "empty where from the count before it was expected to take longer than {patience:g} s.",
     "limits": "ns: time of a value, as in the table of methods. unavoidable: evaluations that "
     "stand in every conversion of the kind, timed alone on arrays in the cache: for a formula one "
     "square root; for fast the longest polynomial of its map and the changes of variable around "

@@ -40,7 +40,8 @@ def command(
         str, typer.Option("--to", metavar="MDF", help="Target of the timed conversions.")
     ] = "ggx",
     quick: Annotated[
-        bool, typer.Option("--quick", help="Seconds in place of a minute: fewer values, rounds.")
+        bool,
+        typer.Option("--quick", help="Less than a minute in place of some: fewer values, rounds."),
     ] = False,
     format_: FormatOption = None,
     csv: Annotated[

@@ -34,6 +34,7 @@ ABOUT_PARTICULAR_ONES = {
     "scene/light.py": "what lights are described by",
     "scene/shininess.py": "the definition of Wavefront's Ns and Pr",
     "benchmark/methods.py": "the paper's sweep",
+    "benchmark/compiled.py": "the kernel that is written in Dr.Jit",
     "cli/bench_command.py": "the pair that is measured by default",
     "cli/plot_error_command.py": "the paper's reference",
     "cli/fit_table_command.py": "the paper's reference",

@@ -22,7 +22,9 @@ from mdfconv.cli import main
 
 # What is drawn and how long it takes is not the question here.
 Figure.savefig = lambda figure, file, **options: file.write(b"a picture")
-timing.QUICK = timing.Sizes(angles=512, conversions=64, fits=4, loop=2, rounds=2)
+timing.QUICK = timing.Sizes(
+    angles=512, conversions=64, fits=4, loop=2, rounds=2, largest=10, patience=0.05
+)
 
 answers = []
 for arguments in json.load(sys.stdin):

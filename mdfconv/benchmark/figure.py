@@ -1,4 +1,4 @@
-"""The picture of speed against error: what is left and below is better."""
+"""The picture of speed against error, and of time against count: low and left is better."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from mdfconv.benchmark.timing import NOISE, Spread
 from mdfconv.output.figures import encoded, line_style, new_figure
 from mdfconv.output.labels import place_labels
 
-_SIZE = (10.0, 5.6)  # inches
+_SIZE = (10.0, 10.0)  # inches
+_PANELS = [["substitutes", "methods"], ["scaling", "scaling"]]
 _MARKERS = "osD^vPX*<>hp"
 # Tell apart variants of one name: parameters of the reference, metrics of a method.
 _FILLS = ("full", "none", "left", "top", "right", "bottom")
@@ -41,7 +42,7 @@ class _Point:
 
 
 def draw(measurements: Measurements, dpi: int = 120) -> bytes:
-    """Return a PNG: error against time of distributions, and of conversion methods.
+    """Return a PNG: error against time of distributions and conversion methods, and their scaling.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ def draw(measurements: Measurements, dpi: int = 120) -> bytes:
         Resolution.
     """
     figure = new_figure(*_SIZE)
-    axes = figure.subplots(1, 2)
+    axes = figure.subplot_mosaic(_PANELS, height_ratios=(5, 4))
     distributions = [
         _Point(
             row.distribution,
@@ -62,24 +63,24 @@ def draw(measurements: Measurements, dpi: int = 120) -> bytes:
         for row in measurements.substitutes
     ]
     methods = [
-        _Point(
-            row.method, f"metric {row.metric}", _nanoseconds(row.per_second), row.parameter_error
-        )
+        _Point(row.method, f"metric {row.metric}", row.nanoseconds, row.parameter_error)
         for row in measurements.methods
     ]
     colors = {point.name: line_style(point.name)["color"] for point in distributions}
     names = dict.fromkeys(point.name for point in methods)
+    method_colors = dict(zip(names, cycle(_COLORS), strict=False))
     panels = (
-        _Panel(axes[0], distributions, colors),
-        _Panel(axes[1], methods, dict(zip(names, cycle(_COLORS), strict=False))),
+        _Panel(axes["substitutes"], distributions, colors),
+        _Panel(axes["methods"], methods, method_colors),
     )
+    _draw_scaling(axes["scaling"], measurements, method_colors)
     pair = measurements.methods[0]
-    axes[0].set(
+    axes["substitutes"].set(
         title="Distributions as substitutes",
         xlabel="time of an evaluation, float32 [ns]",
         ylabel="RMSE of the best fit, unit form",
     )
-    axes[1].set(
+    axes["methods"].set(
         title=f"Conversion methods, {pair.source} → {pair.target}",
         xlabel="time of a conversion [ns]",
         ylabel="median relative error of the parameter against fit",
@@ -91,9 +92,21 @@ def draw(measurements: Measurements, dpi: int = 120) -> bytes:
     return encoded(figure, dpi=dpi)
 
 
-def _nanoseconds(per_second: Spread) -> Spread:
-    median, low, high = (1e9 / value for value in per_second)
-    return Spread(median, high, low)
+def _draw_scaling(axes: Any, measurements: Measurements, colors: dict[str, str]) -> None:
+    """Draw seconds against count, a line a method."""
+    for shape, (method, color) in enumerate(colors.items()):
+        rows = [row for row in measurements.scaling if row.method == method]
+        style = _style(shape, 0, color) | {"linestyle": "-", "markersize": 5}
+        seconds = [row.seconds.median for row in rows]
+        axes.plot([row.values for row in rows], seconds, label=method, linewidth=1, **style)
+    axes.set(
+        title=f"Time against count, metric {measurements.scaling[0].metric}",
+        xlabel="values converted by one call",
+        ylabel="time of the call [s]",
+        xscale="log",
+        yscale="log",
+    )
+    axes.legend(loc="center left", bbox_to_anchor=(1, 0.5))
 
 
 class _Panel:

@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mdfconv.benchmark import kernels, substitutes
+from mdfconv.benchmark import compiled, kernels, scaling, substitutes
+from mdfconv.benchmark.compiled import CompiledSpeed, compiled_speeds
 from mdfconv.benchmark.kernels import KernelSpeed, kernel_speeds
+from mdfconv.benchmark.limits import Limit, limits
 from mdfconv.benchmark.machine import describe
 from mdfconv.benchmark.methods import MethodSpeed, method_speeds
+from mdfconv.benchmark.scaling import ConversionTime, conversion_times
 from mdfconv.benchmark.substitutes import Substitute
 from mdfconv.benchmark.timing import Advance, Sizes
 from mdfconv.distributions import Distribution
@@ -46,8 +49,10 @@ class Task:
         """How often `measure` advances."""
         return (
             substitutes.count_steps(self.parameters.size, self.sizes)
-            + (self.sizes.rounds + 1)
+            + 2 * (self.sizes.rounds + 1)
+            + scaling.count_steps(self.sizes)
             + kernels.count_steps(len(self.candidates), self.sizes)
+            + compiled.count_steps(self.sizes)
         )
 
 
@@ -61,22 +66,28 @@ class Measurements:
         Processor, system and versions.
     sizes : Sizes
         How much was measured.
-    substitutes, methods, kernels : sequence
-        The rows of the three tables.
+    substitutes, methods, scaling, limits, kernels, compiled : sequence
+        The rows of the tables; of the last none without Dr.Jit.
     """
 
     machine: dict[str, str]
     sizes: Sizes
     substitutes: Sequence[Substitute]
     methods: Sequence[MethodSpeed]
+    scaling: Sequence[ConversionTime]
+    limits: Sequence[Limit]
     kernels: Sequence[KernelSpeed]
+    compiled: Sequence[CompiledSpeed]
 
     def records(self) -> dict[str, list[dict[str, Any]]]:
         """Return the tables by their names, as flat rows in full precision."""
         return {
             "substitutes": [row.record() for row in self.substitutes],
             "methods": [row.record() for row in self.methods],
+            "scaling": [row.record() for row in self.scaling],
+            "limits": [row.record() for row in self.limits],
             "kernels": [row.record() for row in self.kernels],
+            "compiled": [row.record() for row in self.compiled],
         }
 
 
@@ -95,13 +106,18 @@ def measure(task: Task, advance: Advance) -> Measurements:
     MdfconvError
         If there is nothing to convert from source to target.
     """
+    pair, sizes = (task.source, task.target), task.sizes
     # The conversions come first: they may refuse the pair.
+    methods = method_speeds(*pair, sizes, advance)
     return Measurements(
         machine=describe(),
-        sizes=task.sizes,
-        methods=method_speeds(task.source, task.target, task.sizes, advance),
+        sizes=sizes,
+        methods=methods,
+        scaling=conversion_times(*pair, sizes, advance),
+        limits=limits(*pair, methods, sizes, advance),
         substitutes=substitutes.substitutes(
-            task.reference, task.parameters, task.candidates, task.sizes, advance
+            task.reference, task.parameters, task.candidates, sizes, advance
         ),
-        kernels=kernel_speeds(task.candidates, task.sizes, advance),
+        kernels=kernel_speeds(task.candidates, sizes, advance),
+        compiled=compiled_speeds(sizes, advance),
     )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,17 +18,16 @@ from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.fit import cold_fit
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.paper.table2 import paper_sweep
 
-LOOP = "curve_fit"
+# Beside the methods: a loop of SciPy's, and the fit without the stored fits.
+LOOP, COLD = "curve_fit", "cold fit"
+# From one size that is tried to the next.
+_STEP = 10
 # The paper's sweep, and every range of widths here, is one of this distribution's m_B.
 _PAPER_SOURCE = "beckmann"
-# Seconds for the many values of `Sizes.conversions`, judged by a few of them, of which each costs
-# several times as much.
-_PATIENCE = 3.0
-
-_Convert: TypeAlias = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,8 @@ class MethodSpeed:
     source, target : str
         Names of the distributions.
     method : str
-        Name of the method, or ``"curve_fit"`` for a loop of scipy.optimize.curve_fit.
+        Name of the method, ``"curve_fit"`` for a loop of scipy.optimize.curve_fit, or
+        ``"cold fit"`` for a fit by a scan, without the stored fits.
     metric : str
         Under which its errors are taken: what it keeps, or unit if it has no choice.
     values : int
@@ -66,6 +67,12 @@ class MethodSpeed:
     rmse: float
     rmse_max: float
     answered: float
+
+    @property
+    def nanoseconds(self) -> Spread:
+        """The time of a value."""
+        median, low, high = (1e9 / value for value in self.per_second)
+        return Spread(median, high, low)
 
     def record(self) -> dict[str, Any]:
         """Return a flat row of a table."""
@@ -148,67 +155,94 @@ def method_speeds(
     """
     if source.is_same(target):
         raise MdfconvError(f"from {source.name} to {target.name} there is nothing to convert")
-    trials = _trials(source, target, sizes)
-    functions = {str(number): trial.run(source) for number, trial in enumerate(trials)}
+    tried = trials(source, target)
+    values = [_size(trial, source, sizes) for trial in tried]
+    functions = {
+        str(number): partial(trial.convert, sweep(source, size))
+        for number, (trial, size) in enumerate(zip(tried, values, strict=True))
+    }
     times = interleave(functions, sizes.rounds, advance)
     return [
-        _speed(source, target, trial, sizes, samples)
-        for trial, samples in zip(trials, times.values(), strict=True)
+        _speed(source, target, trial, size, sizes, samples)
+        for trial, size, samples in zip(tried, values, times.values(), strict=True)
     ]
 
 
 @dataclass(frozen=True)
-class _Trial:
-    """A method under a metric, and the size of the array on which it is timed."""
+class Trial:
+    """A way to convert a pair under a metric.
+
+    Parameters
+    ----------
+    method : str
+        Its name.
+    metric : Metric
+        Under which its errors are taken.
+    convert : callable
+        From parameters of the source, shape (n,), to those of the target.
+    """
 
     method: str
     metric: Metric
-    convert: _Convert
-    values: int
-
-    def run(self, source: Distribution) -> Callable[[], object]:
-        parameter = sweep(source, self.values)
-        return lambda: self.convert(parameter)
+    convert: Callable[[Array], Array]
 
 
-def _trials(source: Distribution, target: Distribution, sizes: Sizes) -> list[_Trial]:
-    """Return the trials: a method that follows no metric once, under the first one."""
+def trials(source: Distribution, target: Distribution) -> list[Trial]:
+    """Return every way to convert a pair: what follows no metric once, under the first one."""
     metrics = [metric_named(name) for name in list_metrics()]
-    trials = []
-    for metric in metrics:
-        for method in covering(source, target, metric):
-            if method.follows_metric or metric is metrics[0]:
-                convert = _by_method(method, source, target, metric)
-                trials.append(_Trial(method.name, metric, convert, _size(convert, source, sizes)))
-    for metric in metrics:
-        trials.append(_Trial(LOOP, metric, _by_loop(source, target, metric), sizes.loop))
-    return trials
+    found = [
+        Trial(method.name, metric, _by_method(method, source, target, metric))
+        for metric in metrics
+        for method in covering(source, target, metric)
+        if method.follows_metric or metric is metrics[0]
+    ]
+    found += [Trial(COLD, metric, _by_scan(source, target, metric)) for metric in metrics]
+    return found + [Trial(LOOP, metric, _by_loop(source, target, metric)) for metric in metrics]
 
 
 def _by_method(
     method: Method, source: Distribution, target: Distribution, metric: Metric
-) -> _Convert:
+) -> Callable[[Array], Array]:
     return lambda parameter: answers(method, parameter, source, target, metric)
 
 
-def _by_loop(source: Distribution, target: Distribution, metric: Metric) -> _Convert:
+def _by_scan(
+    source: Distribution, target: Distribution, metric: Metric
+) -> Callable[[Array], Array]:
+    return lambda parameter: cold_fit(source, parameter, target, metric).parameter
+
+
+def _by_loop(
+    source: Distribution, target: Distribution, metric: Metric
+) -> Callable[[Array], Array]:
     return lambda parameter: curve_fit_loop(source, parameter, target, metric)
 
 
-def _size(convert: _Convert, source: Distribution, sizes: Sizes) -> int:
+def _size(trial: Trial, source: Distribution, sizes: Sizes) -> int:
     """Return the size of array that a method is timed on: many values if it is quick."""
-    few = sweep(source, sizes.fits)
-    convert(few)
-    start = clock()
-    convert(few)
-    many = (clock() - start) * sizes.conversions / sizes.fits
-    return sizes.conversions if many <= _PATIENCE else sizes.fits
+    if trial.method in (COLD, LOOP):
+        return sizes.loop
+    trial.convert(sweep(source, 1))
+    size = sizes.fits
+    # Step by step, as each of a few costs many times as much as one of many.
+    while size < sizes.conversions:
+        start = clock()
+        trial.convert(sweep(source, size))
+        if _STEP * (clock() - start) > sizes.patience:
+            return sizes.fits
+        size *= _STEP
+    return sizes.conversions
 
 
 def _speed(
-    source: Distribution, target: Distribution, trial: _Trial, sizes: Sizes, samples: Array
+    source: Distribution,
+    target: Distribution,
+    trial: Trial,
+    values: int,
+    sizes: Sizes,
+    samples: Array,
 ) -> MethodSpeed:
-    parameter = sweep(source, min(trial.values, sizes.fits))
+    parameter = sweep(source, min(values, sizes.fits))
     result = trial.convert(parameter)
     best = answers(method_named("fit"), parameter, source, target, trial.metric)
     answered = ~np.isnan(result) & ~np.isnan(best)
@@ -219,8 +253,8 @@ def _speed(
         target=target.name,
         method=trial.method,
         metric=str(trial.metric),
-        values=trial.values,
-        per_second=spread(trial.values / samples),
+        values=values,
+        per_second=spread(values / samples),
         parameter_error=_summary(np.median, off),
         parameter_error_max=_summary(np.max, off),
         rmse=_summary(np.median, rmse),

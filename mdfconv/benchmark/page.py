@@ -12,8 +12,12 @@ from mdfconv.output.records import markdown_text
 TITLES = {
     "substitutes": "Distributions as substitutes",
     "methods": "Conversion methods",
+    "scaling": "Time against count",
+    "limits": "Where the limit lies",
     "kernels": "Kernels",
+    "compiled": "A compiled kernel",
 }
+_OF_THE_PAIR = ("methods", "scaling", "limits")
 _LEGENDS = {
     "substitutes": "ns: time to evaluate the unit form at one angle, from β. operations: "
     "arithmetic from cos β with the constants precomputed, a transcendental function counting "
@@ -24,7 +28,17 @@ _LEGENDS = {
     "parameter error: |p/p_fit − 1|, median and maximum, against the best fit under the metric. "
     "RMSE: what the conversion leaves under the metric, relative to the source's signal. "
     "curve_fit: scipy.optimize.curve_fit called once a value, on the samples and weights that fit "
-    "uses, from equal half angles.",
+    "uses, from equal half angles. fit starts from the stored fits; cold fit: without them, by a "
+    "scan.",
+    "scaling": "Nanoseconds a value, of one call for an array of so many values, under {metric}; "
+    "empty where from the count before it was expected to take longer than {patience:g} s.",
+    "limits": "ns: time of a value, as in the table of methods. unavoidable: evaluations that "
+    "stand in every conversion of the kind, timed alone on arrays in the cache: for a formula one "
+    "square root; for fast the longest polynomial of its map and the changes of variable around "
+    "it, or one multiplication where the ratio is constant; for a fit, cold or not, and for "
+    "curve_fit the signals of both distributions at the nodes of a fit that starts near the "
+    "minimum; the bends of a display need more nodes, which are not counted. ×: the one over the "
+    "other, of medians.",
     "kernels": "ns: time to evaluate the unit form at one angle. textbook: the printed "
     "expression in NumPy. functions: the transcendental functions that the form cannot avoid, "
     "with a copy where there are fewer than two, timed alone on whole arrays. copy: copying the "
@@ -32,6 +46,8 @@ _LEGENDS = {
     "medians over rounds. memory: peak of newly allocated memory over the size of the result. The "
     "angles rise: beyond the end of Schlick's lobe whole blocks are skipped; in random order it "
     "takes longer.",
+    "compiled": "ns: time to evaluate the unit form at one angle, from β. Dr.Jit: the same form, "
+    "with one sine, compiled by its LLVM backend and run in one thread.",
 }
 _CHOOSING = """\
 ## Choosing
@@ -48,8 +64,8 @@ they do not know, use `fast` or `fit`.
 
 
 def tables(measurements: Measurements) -> dict[str, list[dict[str, Any]]]:
-    """Return the three tables with rounded cells, a median with its quartiles in one."""
-    return {
+    """Return the tables that have rows, in rounded cells, a median with its quartiles in one."""
+    every: dict[str, list[dict[str, Any]]] = {
         "substitutes": [
             {
                 "reference": f"{row.reference} {row.reference_parameter:g}",
@@ -78,6 +94,18 @@ def tables(measurements: Measurements) -> dict[str, list[dict[str, Any]]]:
             }
             for row in measurements.methods
         ],
+        "scaling": _scaling_table(measurements),
+        "limits": [
+            {
+                "method": row.method,
+                "metric": row.metric,
+                "ns": _plain(row.conversion),
+                "unavoidable": row.work,
+                "its ns": _plain(row.unavoidable),
+                "×": _rounded(row.ratio),
+            }
+            for row in measurements.limits
+        ],
         "kernels": [
             {
                 "distribution": row.distribution,
@@ -94,24 +122,48 @@ def tables(measurements: Measurements) -> dict[str, list[dict[str, Any]]]:
             }
             for row in measurements.kernels
         ],
+        "compiled": [
+            {
+                "distribution": row.distribution,
+                "type": row.precision,
+                "kernel ns": _times(row.kernel),
+                "Dr.Jit ns": _times(row.drjit),
+            }
+            for row in measurements.compiled
+        ],
     }
+    return {name: rows for name, rows in every.items() if rows}
+
+
+def _scaling_table(measurements: Measurements) -> list[dict[str, Any]]:
+    """Return a row a method with a column a count."""
+    counts = dict.fromkeys(row.values for row in measurements.scaling)
+    rows: dict[str, dict[str, Any]] = {}
+    for time in measurements.scaling:
+        row = rows.setdefault(time.method, {"method": time.method} | {f"{n:,}": "" for n in counts})
+        row[f"{time.values:,}"] = f"{_rounded(1e9 * time.seconds.median / time.values):,.10g}"
+    return list(rows.values())
 
 
 def title(measurements: Measurements, name: str) -> str:
     """Return the heading of a table."""
-    if name != "methods":
+    if name not in _OF_THE_PAIR:
         return TITLES[name]
     pair = measurements.methods[0]
     return f"{TITLES[name]}, {pair.source} → {pair.target}"
 
 
 def sentences(measurements: Measurements) -> dict[str, list[str]]:
-    """Return what each table says."""
-    return {
+    """Return what each table that has rows says."""
+    every = {
         "substitutes": verdicts.on_substitutes(measurements),
         "methods": verdicts.on_methods(measurements),
+        "scaling": verdicts.on_scaling(measurements),
+        "limits": verdicts.on_limits(measurements),
         "kernels": verdicts.on_kernels(measurements),
+        "compiled": verdicts.on_compiled(measurements),
     }
+    return {name: said for name, said in every.items() if said}
 
 
 def markdown_page(measurements: Measurements, picture: str | None = None) -> str:
@@ -126,13 +178,22 @@ def markdown_page(measurements: Measurements, picture: str | None = None) -> str
     """
     lines = ["# Speed against error", "", _machine(measurements), ""]
     if picture:
-        lines += [f"![Error against time, distributions and methods]({picture})", ""]
+        lines += [
+            f"![Error against time, distributions and methods; time against count]({picture})",
+            "",
+        ]
     said = sentences(measurements)
     for name, rows in tables(measurements).items():
-        lines += [f"## {title(measurements, name)}", "", _LEGENDS[name], ""]
+        lines += [f"## {title(measurements, name)}", "", _legend(measurements, name), ""]
         lines += [markdown_text(list(rows[0]), rows), ""]
         lines += [*(f"- {sentence}" for sentence in said[name]), ""]
     return "\n".join([*lines, _CHOOSING])
+
+
+def _legend(measurements: Measurements, name: str) -> str:
+    return _LEGENDS[name].format(
+        metric=measurements.scaling[0].metric, patience=measurements.sizes.patience
+    )
 
 
 def _machine(measurements: Measurements) -> str:
@@ -153,6 +214,11 @@ def _rounded(value: float, digits: int = 3) -> float:
 
 def _times(times: Spread) -> str:
     return f"{times.median:#.3g} ({times.low:#.3g}–{times.high:#.3g})"
+
+
+def _plain(times: Spread) -> str:
+    median, low, high = (f"{_rounded(value):,.10g}" for value in times)
+    return f"{median} ({low}–{high})"
 
 
 def _counts(counts: Spread) -> str:

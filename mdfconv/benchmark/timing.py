@@ -35,13 +35,17 @@ class Sizes:
     angles : int
         Angles of an evaluation, uniform on [0, π/2].
     conversions : int
-        Values of a conversion by a method for which that many take about a second at most.
+        Values of a conversion by a method that needs no more than `patience` for them.
     fits : int
         Values of a conversion by any other method, and of the comparison of results.
     loop : int
-        Values of a loop of scipy.optimize.curve_fit.
+        Values of a loop of scipy.optimize.curve_fit, and of a fit by a scan.
     rounds : int
         Repeats that are counted.
+    largest : int
+        Values of the largest conversion in the table of times against counts.
+    patience : float
+        Seconds that one conversion may take; what would take longer is given fewer values.
     """
 
     angles: int
@@ -49,10 +53,22 @@ class Sizes:
     fits: int
     loop: int
     rounds: int
+    largest: int
+    patience: float
 
 
-FULL = Sizes(angles=4_000_000, conversions=1_000_000, fits=256, loop=17, rounds=11)
-QUICK = Sizes(angles=2_000_000, conversions=100_000, fits=32, loop=5, rounds=5)
+FULL = Sizes(
+    angles=4_000_000,
+    conversions=1_000_000,
+    fits=256,
+    loop=17,
+    rounds=11,
+    largest=10**7,
+    patience=3.0,
+)
+QUICK = Sizes(
+    angles=2_000_000, conversions=100_000, fits=32, loop=5, rounds=5, largest=10**5, patience=0.2
+)
 
 
 class Spread(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 
 from mdfconv.benchmark.kernels import KernelSpeed
 from mdfconv.benchmark.measure import Measurements
-from mdfconv.benchmark.methods import LOOP, MethodSpeed
+from mdfconv.benchmark.methods import COLD, LOOP, MethodSpeed
 from mdfconv.benchmark.pareto import front
 from mdfconv.benchmark.substitutes import PRECISIONS, Substitute
 from mdfconv.benchmark.timing import NOISE
@@ -91,13 +91,14 @@ def on_methods(measurements: Measurements) -> list[str]:
     """Say how fast the methods are, and how far from the best fit."""
     rows = measurements.methods
     fits = {row.metric: row for row in rows if row.method == "fit"}
-    sentences = [_approximation(row) for row in rows if row.method not in ("fit", LOOP)]
+    fitted = {"fit": "", LOOP: f"a loop of {LOOP}", COLD: f"a {COLD}"}
+    sentences = [_approximation(row) for row in rows if row.method not in fitted]
     for row in rows:
-        if row.method == LOOP:
+        if row.method in (COLD, LOOP):
             ratio = fits[row.metric].per_second.median / row.per_second.median
             sentences.append(
                 f"Under {row.metric}, fit converts {ratio:.2g} times as many values a second as "
-                f"a loop of {LOOP}, which comes within {row.parameter_error_max:.2g} of it."
+                f"{fitted[row.method]}, which comes within {row.parameter_error_max:.2g} of it."
             )
     return sentences
 
@@ -108,6 +109,41 @@ def _approximation(row: MethodSpeed) -> str:
         f"{row.parameter_error_max:.2g} of the best fit under {row.metric} (half of the sweep "
         f"within {row.parameter_error:.2g})."
     )
+
+
+def on_scaling(measurements: Measurements) -> list[str]:
+    """Say what a call of each method costs, and what a value among many does."""
+    rows = measurements.scaling
+    sentences = []
+    for method in dict.fromkeys(row.method for row in rows):
+        times = [row for row in rows if row.method == method]
+        first, last = times[0], times[-1]
+        call, value = 1e6 * first.seconds.median, 1e9 * last.seconds.median / last.values
+        sentences.append(
+            f"A call of {method} for one value takes {_plain(call)} µs; among {last.values:,} a "
+            f"value takes {_plain(value)} ns."
+        )
+    return sentences
+
+
+def on_limits(measurements: Measurements) -> list[str]:
+    """Say how many times the unavoidable each method takes, metric by metric."""
+    sentences = []
+    for metric in dict.fromkeys(row.metric for row in measurements.limits):
+        ratios = {row.method: row.ratio for row in measurements.limits if row.metric == metric}
+        nearest = sorted(ratios, key=ratios.__getitem__)
+        listed = _and([f"{name} {_plain(ratios[name])}" for name in nearest])
+        sentences.append(f"Under {metric}, the times over those of the unavoidable are {listed}.")
+    return sentences
+
+
+def on_compiled(measurements: Measurements) -> list[str]:
+    """Say how the kernel compares with the compiled one; nothing if that was not measured."""
+    return [
+        f"In {row.precision} Dr.Jit evaluates {row.distribution} in "
+        f"{row.drjit.median / row.kernel.median:.2g} of the time of the kernel."
+        for row in measurements.compiled
+    ]
 
 
 def on_kernels(measurements: Measurements) -> list[str]:
@@ -132,6 +168,11 @@ def _listed(values: dict[str, float], names: Sequence[str]) -> str:
 
 def _and(words: Sequence[str]) -> str:
     return "" if not words else ", ".join(words[:-1]) + " and " * (len(words) > 1) + words[-1]
+
+
+def _plain(value: float) -> str:
+    """Return two digits of a number, written out: 0.31, 4.2, 84,000."""
+    return f"{float(f'{value:.2g}'):,.10g}"
 
 
 def _count(value: float) -> str:

@@ -40,7 +40,8 @@ def command(
         str, typer.Option("--to", metavar="MDF", help="Target of the timed conversions.")
     ] = "ggx",
     quick: Annotated[
-        bool, typer.Option("--quick", help="Seconds in place of a minute: fewer values, rounds.")
+        bool,
+        typer.Option("--quick", help="Less than a minute in place of some: fewer values, rounds."),
     ] = False,
     format_: FormatOption = None,
     csv: Annotated[
@@ -53,10 +54,11 @@ def command(
 ) -> None:
     """Measure speed against error on this machine.
 
-    Distributions in the place of another one, conversion methods, and kernels against their
-    textbook expressions: medians of interleaved repeats with quartiles, and what they say in
-    sentences. CSV has the three tables one below another, told apart by the column "table";
-    markdown is a page.
+    Distributions in the place of another one, conversion methods, their times for one value to
+    millions and how far those are from the evaluations that they cannot avoid, and kernels against
+    their textbook expressions: medians of interleaved repeats with quartiles, and what they say in
+    sentences. If Dr.Jit is installed, a kernel that it compiles is timed as well. CSV has the
+    tables one below another, told apart by the column "table"; markdown is a page.
 
     Examples:
 

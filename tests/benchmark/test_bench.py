@@ -5,6 +5,8 @@ import io
 import json
 import os
 import stat
+import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,9 +14,12 @@ from PIL import Image
 from scipy.optimize import minimize_scalar
 
 import mdfconv
+from mdfconv.benchmark import compiled
+from mdfconv.benchmark.limits import limits
 from mdfconv.benchmark.loop import curve_fit_loop
 from mdfconv.benchmark.methods import answers, method_speeds, sweep
 from mdfconv.benchmark.pareto import front
+from mdfconv.benchmark.scaling import conversion_times, count_steps
 from mdfconv.benchmark.substitutes import substitutes
 from mdfconv.benchmark.timing import Sizes, interleave, spread
 from mdfconv.conversion import method_named
@@ -24,7 +29,7 @@ from mdfconv.output.figures import PAGE, new_figure
 from mdfconv.output.labels import place_labels
 from tests.cli.runner import run, run_on_terminal
 
-TINY = Sizes(angles=512, conversions=64, fits=4, loop=2, rounds=1)
+TINY = Sizes(angles=512, conversions=64, fits=4, loop=2, rounds=1, largest=100, patience=0.05)
 NAMES = [entry.name for entry in one_parameter_distributions()]
 
 
@@ -48,7 +53,7 @@ def test_tables_are_the_same_in_csv_and_json(quick):
     assert [line.split()[:2] for line in err.splitlines()] == [["mdfconv:", "wrote"]] * 3
     report = json.loads(files["json"].read_text())
     rows = list(csv.DictReader(io.StringIO(files["csv"].read_text())))
-    for name in ("substitutes", "methods", "kernels"):
+    for name in ("substitutes", "methods", "scaling", "limits", "kernels", "compiled"):
         own = [row for row in rows if row["table"] == name]
         assert len(own) == len(report[name])
         for row, record in zip(own, report[name], strict=True):
@@ -63,11 +68,15 @@ def test_quick_run_holds_every_row_and_times_with_their_spread(quick):
     report = json.loads(quick[0]["json"].read_text())
     assert [row["distribution"] for row in report["substitutes"]] == 2 * NAMES
     assert [row["distribution"] for row in report["kernels"]] == 2 * NAMES
-    covering = {"closed-form", "half-angle", "peak", "fit", "curve_fit"}
-    assert covering <= {row["method"] for row in report["methods"]}
+    covering = {"closed-form", "half-angle", "peak", "fit", "fast", "cold fit", "curve_fit"}
+    for table in ("methods", "scaling", "limits"):
+        assert covering <= {row["method"] for row in report[table]}
     for table, times in (
         ("substitutes", ("ns_float64", "ns_float32")),
         ("methods", ("per_second",)),
+        ("scaling", ("seconds",)),
+        ("limits", ("conversion_ns", "unavoidable_ns")),
+        ("compiled", ("kernel_ns", "drjit_ns")),
         ("kernels", ("kernel_ns", "textbook_ns", "floor_ns", "copy_ns")),
     ):
         for row in report[table]:
@@ -80,12 +89,13 @@ def test_quick_run_holds_every_row_and_times_with_their_spread(quick):
 def test_page_is_complete(quick):
     out = quick[1]
     assert out.startswith("# Speed against error\n")
-    assert "![Error against time, distributions and methods](out.png)" in out
-    for heading in ("Distributions as substitutes", "Conversion methods", "Kernels", "Choosing"):
+    assert "![Error against time, distributions and methods; time against count](out.png)" in out
+    headings = ("Distributions as substitutes", "Conversion methods", "Time against count")
+    for heading in (*headings, "Where the limit lies", "Kernels", "Choosing"):
         assert f"## {heading}" in out
     assert "being rational buys" in out
     tables = [line for line in out.splitlines() if line.startswith("| ---")]
-    assert len(tables) == 3
+    assert len(tables) == 5 + ("## A compiled kernel" in out)
 
 
 def test_picture_and_permissions(quick):
@@ -179,10 +189,61 @@ def test_methods_of_any_pair(source, target):
     fits = [row for row in measured if row.method == "fit"]
     assert [row.metric for row in fits] == list_metrics()
     assert all(row.parameter_error_max == 0 and row.answered == 1 for row in fits)
+    colds = [row for row in measured if row.method == "cold fit"]
+    assert [row.metric for row in colds] == list_metrics()
+    assert all(row.parameter_error_max < 1e-6 for row in colds)
     closed = next(row for row in measured if row.method == "closed-form")
     assert closed.metric == "unit"
     assert closed.rmse_max >= closed.rmse
     assert closed.values in (TINY.conversions, TINY.fits)
+
+
+@pytest.mark.parametrize(("source", "target"), [("beckmann", "ggx"), ("gauss", "gtr")])
+def test_limits_of_any_pair(source, target):
+    pair = [mdfconv.distribution(name) for name in (source, target)]
+    speeds = method_speeds(*pair, TINY, ignore)
+    rows = limits(*pair, speeds, TINY, ignore)
+    assert [(row.method, row.metric) for row in rows] == [
+        (row.method, row.metric) for row in speeds
+    ]
+    for row, speed in zip(rows, speeds, strict=True):
+        assert row.conversion == speed.nanoseconds
+        assert row.ratio == row.conversion.median / row.unavoidable.median > 0
+        assert ("angles" in row.work) == ("fit" in row.method)
+        if row.method == "fast":
+            constant = target == "ggx" and row.metric == "environment"
+            assert ("polynomial" in row.work) != constant
+
+
+def test_scaling_begins_with_one_value_and_ends_when_patience_does():
+    pair = [mdfconv.distribution(name) for name in ("beckmann", "ggx")]
+    steps = []
+    rows = conversion_times(*pair, TINY, steps.append)
+    assert len(steps) == count_steps(TINY)
+    counts = {row.method: [] for row in rows}
+    for row in rows:
+        counts[row.method].append(row.values)
+    assert counts["closed-form"] == [1, 10, 100]
+    assert {row.metric for row in rows} == {"unit"}
+    impatient = conversion_times(*pair, replace(TINY, patience=0.0), ignore)
+    assert {row.values for row in impatient} == {1}
+    assert {row.method for row in impatient} == set(counts)
+
+
+@pytest.mark.parametrize(("precision", "tolerance"), [("float64", 1e-12), ("float32", 1e-5)])
+def test_compiled_kernel_is_that_of_the_distribution(precision, tolerance):
+    pytest.importorskip("drjit")
+    beta = np.linspace(0, np.pi / 2, 999, dtype=precision)
+    wanted = mdfconv.distribution("ggx").unit(beta, 0.2)
+    np.testing.assert_allclose(compiled.evaluation(beta, 0.2)().numpy(), wanted, rtol=tolerance)
+    rows = compiled.compiled_speeds(TINY, ignore)
+    assert [row.precision for row in rows] == ["float64", "float32"]
+
+
+def test_without_drjit_nothing_is_compiled(monkeypatch):
+    monkeypatch.setitem(sys.modules, "drjit", None)
+    assert compiled.compiled_speeds(TINY, ignore) == []
+    assert compiled.count_steps(TINY) == 0
 
 
 def test_front():

@@ -20,7 +20,7 @@ from mdfconv.fitting import metrics
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.fitting.metrics.energy import Energy
 
-TINY = Sizes(angles=512, conversions=64, fits=4, loop=2, rounds=1)
+TINY = Sizes(angles=512, conversions=64, fits=4, loop=2, rounds=1, largest=100, patience=0.05)
 
 
 class Cosine(BlinnPhong):

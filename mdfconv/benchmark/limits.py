@@ -11,8 +11,8 @@ import numpy as np
 from mdfconv.benchmark.methods import COLD, LOOP, MethodSpeed, answers, sweep
 from mdfconv.benchmark.timing import Advance, Sizes, Spread, interleave, spread
 from mdfconv.conversion import method_named
-from mdfconv.distributions import Distribution, distribution
-from mdfconv.fitting.maps import StoredFit, load
+from mdfconv.distributions import Distribution
+from mdfconv.fitting.maps import StoredFit, horner
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.problem import narrowest
 from mdfconv.fitting.quadrature import SmoothQuadrature
@@ -107,7 +107,7 @@ def _work(source: Distribution, target: Distribution, row: MethodSpeed, sizes: S
     stored = StoredFit(source, target, metric)
     if stored.exact:
         return _Work("a multiplication", _BLOCK, lambda: parameter * 0.5)
-    return _of_map(stored, str(metric))
+    return _of_map(stored)
 
 
 def _of_fit(source: Distribution, target: Distribution, metric: Metric, sizes: Sizes) -> _Work:
@@ -129,20 +129,15 @@ def _of_fit(source: Distribution, target: Distribution, metric: Metric, sizes: S
     return _Work(words, parameter.size, run)
 
 
-def _of_map(stored: StoredFit, metric: str) -> _Work:
+def _of_map(stored: StoredFit) -> _Work:
     """Return the longest polynomial of a map and the two changes of variable."""
-    first, last = (distribution(name).map_variables for name in stored.pair)
-    assert first, "a pair that has a map has its variables"
-    assert last, "a pair that has a map has its variables"
-    polynomial = max(load()[" ".join((metric, *stored.pair))].coefficients, key=len).tolist()
+    assert stored.map, "what converts by no constant has a map"
+    first, last = stored.variables
+    polynomial = max(stored.map.coefficients, key=len)
     x = np.linspace(0.1, 0.5, _BLOCK)
     parameter = first.from_width(x)
 
     def run() -> None:
-        value = np.full_like(x, polynomial[-1])
-        for coefficient in polynomial[-2::-1]:
-            value *= x
-            value += coefficient
-        last.from_map(first.width(parameter), value)
+        last.from_map(first.width(parameter), horner(polynomial, x))
 
     return _Work(f"a polynomial of {len(polynomial)} terms, two changes of variable", x.size, run)

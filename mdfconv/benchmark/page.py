@@ -141,7 +141,7 @@ def _scaling_table(measurements: Measurements) -> list[dict[str, Any]]:
     rows: dict[str, dict[str, Any]] = {}
     for time in measurements.scaling:
         row = rows.setdefault(time.method, {"method": time.method} | {f"{n:,}": "" for n in counts})
-        row[f"{time.values:,}"] = f"{_rounded(1e9 * time.seconds.median / time.values):,.10g}"
+        row[f"{time.values:,}"] = _written(1e9 * time.seconds.median / time.values)
     return list(rows.values())
 
 
@@ -217,8 +217,12 @@ def _times(times: Spread) -> str:
 
 
 def _plain(times: Spread) -> str:
-    median, low, high = (f"{_rounded(value):,.10g}" for value in times)
+    median, low, high = map(_written, times)
     return f"{median} ({low}–{high})"
+
+
+def _written(value: float) -> str:
+    return f"{_rounded(value):,.10g}"
 
 
 def _counts(counts: Spread) -> str:

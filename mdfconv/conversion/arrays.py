@@ -141,16 +141,22 @@ def apply(
     method: Method, metric: Metric, parameter: Array, source: Endpoint, target: Endpoint
 ) -> Array:
     """Convert legal parameters; raise unless every result is legal and can be stored."""
-    exact = exact_route(source.distribution, target.distribution)
-    with np.errstate(all="ignore"):
-        if exact is not None:
-            result = np.asarray(follow(exact, parameter))
-        else:
-            check_covered(method, metric, source, target)
-            pair = source.distribution, target.distribution
-            result = np.asarray(method.convert(parameter, *pair, metric))
+    result = _results(method, metric, parameter, source, target)
     _check_results(method, metric, parameter, result, source, target)
     return result
+
+
+def _results(
+    method: Method, metric: Metric, parameter: Array, source: Endpoint, target: Endpoint
+) -> Array:
+    """Convert parameters, exactly where that is possible; NaN where there is no answer."""
+    pair = source.distribution, target.distribution
+    exact = exact_route(*pair)
+    with np.errstate(all="ignore"):
+        if exact is not None:
+            return np.asarray(follow(exact, parameter))
+        check_covered(method, metric, source, target)
+        return np.asarray(method.convert(parameter, *pair, metric))
 
 
 def apply_free(
@@ -192,8 +198,6 @@ def _convert(
 ) -> Any:
     """Convert an operand, in its shape and floating type."""
     with_gaps = method.gaps_as_nan and np.ndim(operand) > 0
-    if with_gaps and exact_route(source.distribution, target.distribution) is None:
-        check_covered(method, metric, source, target)
 
     def stored(values: Any) -> Array:
         if with_gaps:
@@ -222,14 +226,9 @@ def _apply_with_gaps(
     method: Method, metric: Metric, operand: Array, source: Endpoint, target: Endpoint
 ) -> Array:
     """Convert an array; NaN where there is no answer."""
-    exact = exact_route(source.distribution, target.distribution)
     with np.errstate(all="ignore"):
         parameter = source.decode_legal(np.asarray(operand, dtype=np.float64))
-        if exact is not None:
-            result = follow(exact, parameter)
-        else:
-            pair = source.distribution, target.distribution
-            result = method.convert(parameter, *pair, metric)
+    result = _results(method, metric, parameter, source, target)
     stored = target.encode(result)
     legal = target.distribution.parameter.accepts(result)
     return stored if legal.all() else np.where(legal, stored, np.nan)

@@ -38,13 +38,13 @@ class Fast(Method):
 
     def covers(self, source: Distribution, target: Distribution, metric: Metric) -> bool:
         """Return whether there is a map, one to make others from, or a constant."""
-        return StoredFit(source, target, metric.from_stored()[0]).known
+        return _stored(source, target, metric).known
 
     def convert(
         self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
     ) -> Array:
         """Evaluate the polynomials; NaN outside their range."""
-        stored = StoredFit(source, target, metric.from_stored()[0])
+        stored = _stored(source, target, metric)
         if len(metric.from_stored()) > 1 and not stored.exact:
             from mdfconv.fitting.map_making import made_map
 
@@ -55,7 +55,12 @@ class Fast(Method):
 
     def range_text(self, source: Distribution, target: Distribution, metric: Metric) -> str:
         """Return which parameters of the source the stored maps cover."""
-        return StoredFit(source, target, metric.from_stored()[0]).range_text()
+        return _stored(source, target, metric).range_text()
+
+
+def _stored(source: Distribution, target: Distribution, metric: Metric) -> StoredFit:
+    """Return what is stored under a metric, or under the one that it is followed from."""
+    return StoredFit(source, target, metric.from_stored()[0])
 
 
 METHOD = Fast()

@@ -233,22 +233,19 @@ class FitCurve:
         As for `fit`.
     knots : numpy.ndarray, shape (k,)
         Legal parameters of the source.
-
-    Attributes
-    ----------
-    fits : Fit
-        Those of the knots.
     """
 
     def __init__(
         self, source: Distribution, knots: Array, target: Distribution, metric: Metric
     ) -> None:
         self._problem = source, target, metric
-        self.fits = cold_fit(source, knots, target, metric)
+        fits = cold_fit(source, knots, target, metric)
         order = np.argsort(knots)
         x = np.log(knots[order])
-        known = ~np.isnan(self.fits.parameter[order]) & (np.diff(x, prepend=-np.inf) > 0)
-        self._log_knots, self._known = x[known], order[known]
+        known = ~np.isnan(fits.parameter[order]) & (np.diff(x, prepend=-np.inf) > 0)
+        self._log_knots = x[known]
+        self._log_fits = np.log(fits.parameter[order][known])
+        self._distances = fits.distance[order][known]
 
     def __call__(self, parameter: Array) -> Fit:
         """Return the fits of values, shape (n,); NaN where the curve leads astray.
@@ -261,10 +258,10 @@ class FitCurve:
         if self._log_knots.size < _LEAST_KNOTS:
             return _nowhere(parameter.size, target)
         x = np.log(parameter)
-        through = np.log(self.fits.parameter[self._known])
-        start = np.exp(PchipInterpolator(self._log_knots, through, extrapolate=False)(x))
+        curve = PchipInterpolator(self._log_knots, self._log_fits, extrapolate=False)
+        start = np.exp(curve(x))
         found = _fit_near(source, parameter, target, [metric, metric], start)
-        usual = np.interp(x, self._log_knots, self.fits.distance[self._known])
+        usual = np.interp(x, self._log_knots, self._distances)
         astray = ~(found.distance <= _AS_USUAL * usual)
         if metric.similar_below:
             astray |= source.half_tangent(parameter) < metric.similar_below

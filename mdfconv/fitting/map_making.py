@@ -8,13 +8,13 @@ from functools import cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.polynomial import chebyshev, polynomial
+from numpy.polynomial import chebyshev
 
 from mdfconv.distributions import distribution
 from mdfconv.distributions.declarations import MapVariables
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.fit import warm_fit
-from mdfconv.fitting.maps import Map, load
+from mdfconv.fitting.maps import Map, StoredFit
 from mdfconv.fitting.metrics import metric_named
 
 _NODES, _CHECKS, _MOST_TERMS = 32, 37, 25
@@ -106,24 +106,22 @@ class MapMaker:
         nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
         # The upper end, where a target may run out, is the hardest place; the lower may be 0.
         checks = np.linspace(-1, 1, _CHECKS + 1)[1:]
-        x = middle + half * np.append(nodes, checks)
+        # Rounding must not lead beyond the piece.
+        x = np.minimum(middle + half * np.append(nodes, checks), high)
         fitted = self.fitted(x)
-        stored, wanted = self.product(x, fitted)[:_NODES], fitted[_NODES:]
+        stored, wanted, checked = self.product(x, fitted)[:_NODES], fitted[_NODES:], x[_NODES:]
         if np.isnan(fitted).any():
             none = np.nan if np.isnan(fitted).all() else 0.0
             return Piece(low, high, np.array([none]), np.inf)
         series = chebyshev.chebfit(nodes, stored, _NODES - 1)
         for terms in range(1, _MOST_TERMS + 1):
             power = chebyshev.cheb2poly(series[:terms])
-            got = self._from_product(x[_NODES:], polynomial.polyval(checks, power))
+            product = Map(np.array([low, high]), (power,), self.factored)(checked)
+            got = self.variables[1].from_map(checked, product)
             worst = float(np.max(np.abs(got / wanted - 1)))
             if worst < self.tolerance:
                 break
         return Piece(low, high, power, worst)
-
-    def _from_product(self, x: Array, value: Array) -> Array:
-        product = value * (1 - x) * (1 + x) if self.factored else value
-        return self.variables[1].from_map(x, product)
 
     def _bend(self, low: float, high: float) -> float | None:
         """Return where the fit jumps or bends in a piece, None if it is smooth."""
@@ -147,25 +145,23 @@ def made_map(source: str, target: str, metric: str) -> Map:
     Parameters
     ----------
     source, target : str
-        The pair, as in the names of `load`.
+        The pair of a `StoredFit`.
     metric : str
         A metric whose `from_stored` begins with another one that has a map of the pair.
     """
     ends, kept = (distribution(source), distribution(target)), metric_named(metric)
-    stored = load()[f"{kept.from_stored()[0]} {source} {target}"]
-    first, last = (end.map_variables for end in ends)
-    assert first is not None, "asked only for a pair that has a map"
-    assert last is not None, "asked only for a pair that has a map"
+    stored = StoredFit(*ends, kept.from_stored()[0])
+    assert stored.map is not None, "asked only for a pair that has a map"
 
     def fits(parameter: Array) -> Array:
         return warm_fit(ends[0], parameter, ends[1], kept).parameter
 
-    maker = MapMaker((first, last), stored.factored, fits, _MADE_TOLERANCE, _MADE_NARROWEST)
+    maker = MapMaker(stored.variables, stored.map.factored, fits, _MADE_TOLERANCE, _MADE_NARROWEST)
     # The lobes' own bends stay where they are, what else there is is found.
-    edges = np.minimum(stored.edges, _MADE_END)
+    edges = np.minimum(stored.map.edges, _MADE_END)
     pieces = [
         piece if piece.error < _MADE_TOLERANCE else replace(piece, coefficients=np.array([np.nan]))
         for low, high in pairwise(edges.tolist())
         for piece in maker.pieces(low, high)
     ]
-    return maker.map(pieces, stored.edges[-1])
+    return maker.map(pieces, stored.map.edges[-1])

@@ -55,13 +55,14 @@ class Map:
             inside = np.flatnonzero((x > low) & (x <= high))
             if inside.size:
                 z = (x[inside] - 0.5 * (low + high)) * (2 / (high - low))
-                value[inside] = _horner(piece, z)
+                value[inside] = horner(piece, z)
         if self.factored:
             value *= (1 - x) * (1 + x)
         return value
 
 
-def _horner(coefficients: Array, z: Array) -> Array:
+def horner(coefficients: Array, z: Array) -> Array:
+    """Return a polynomial at z, shape (n,); the coefficients begin with the constant."""
     value = np.full_like(z, coefficients[-1])
     for coefficient in coefficients[-2::-1].tolist():
         value *= z
@@ -114,8 +115,12 @@ class StoredFit:
     ----------
     known : bool
         Whether there are any.
+    map : Map or None
+        The polynomials, where there are some.
     pair : tuple of str
         Source and target of the map, "" where there is none.
+    variables : tuple of MapVariables
+        Those of the pair, where there is a map.
     """
 
     def __init__(self, source: Distribution, target: Distribution, metric: Metric) -> None:
@@ -125,7 +130,7 @@ class StoredFit:
         self._onward = from_root(source, same_lobe=True)
         self._symbol, self._above = source.parameter.symbol, source.parameter.larger_is_smoother
         self._ratio = metric.ratio(self._first, self._last)
-        self._map: Map | None = None
+        self.map: Map | None = None
         self.pair = "", ""
         if self._ratio is None:
             self._find(target, str(metric))
@@ -134,7 +139,7 @@ class StoredFit:
         for last in (target, self._last):
             stored = load().get(f"{metric} {self._first.name} {last.name}")
             if stored and self._first.map_variables and last.map_variables:
-                self._map, self._variables = stored, (self._first.map_variables, last.map_variables)
+                self.map, self.variables = stored, (self._first.map_variables, last.map_variables)
                 self.pair = self._first.name, last.name
                 if last is target:
                     self._back = ()
@@ -148,12 +153,12 @@ class StoredFit:
     @property
     def known(self) -> bool:
         """Whether there are any."""
-        return self._map is not None or self._ratio is not None
+        return self.map is not None or self._ratio is not None
 
     def with_map(self, other: Map) -> StoredFit:
         """Return the fits with another map of their pair."""
         fits = copy(self)
-        fits._map = other
+        fits.map = other
         return fits
 
     def __call__(self, parameter: Array) -> Array:
@@ -161,20 +166,20 @@ class StoredFit:
         if self._ratio is not None:
             first = follow(self._forward, parameter)
             return follow(self._back, scaled(first, self._ratio, self._last))
-        assert self._map is not None, "asked only for what is known"
-        source, target = self._variables
+        assert self.map is not None, "asked only for what is known"
+        source, target = self.variables
         values = parameter.ravel()
         answers = np.empty_like(values)
         for start in range(0, values.size, _BLOCK):
             block = slice(start, start + _BLOCK)
             x = source.width(follow(self._forward, values[block]))
-            answers[block] = follow(self._back, target.from_map(x, self._map(x)))
+            answers[block] = follow(self._back, target.from_map(x, self.map(x)))
         return answers.reshape(parameter.shape)
 
     def range_text(self) -> str:
         """Return which parameters of the source the maps cover; "" for all."""
-        if self._map is None:
+        if self.map is None:
             return ""
-        end = self._variables[0].from_width(np.asarray(self._map.edges[-1]))
+        end = self.variables[0].from_width(np.asarray(self.map.edges[-1]))
         end = follow(self._onward, end)
         return f"{self._symbol} {'≥' if self._above else '≤'} {float(end):.6g}"

@@ -64,10 +64,9 @@ class Problem:
         else:
             self._quadrature, self._rows = quadrature, rows
         self._source_breaks = self._breaks(source, self._source_parameter, self._peak)
-        self._moving = bool(metric.kinks) or target.edge(np.ones(1)) is not None
         # Unless the panels move with the target, all distances share their samples.
         self._samples: tuple[Array, Array, Array] | None = None
-        if not self._moving:
+        if not metric.kinks and target.edge(np.ones(1)) is None:
             self._samples = self._sampled(np.arange(rows.size), *self._source_breaks)
 
     @property

@@ -28,8 +28,9 @@ _LEGENDS = {
     "parameter error: |p/p_fit − 1|, median and maximum, against the best fit under the metric. "
     "RMSE: what the conversion leaves under the metric, relative to the source's signal. "
     "curve_fit: scipy.optimize.curve_fit called once a value, on the samples and weights that fit "
-    "uses, from equal half angles. fit starts from the stored fits; cold fit: without them, by a "
-    "scan.",
+    "uses, from equal half angles. fit starts from the stored fits, and here "
+    "finds each by itself: in arrays of more than 8192 most come from a curve through 4097 of "
+    "them, to 1e-8, as time against count shows. cold fit: without stored fits, by a scan.",
     "scaling": "Nanoseconds a value, of one call for an array of so many values, under {metric}; "
     "empty where from the count before it was expected to take longer than {patience:g} s.",
     "limits": "ns: time of a value, as in the table of methods. unavoidable: evaluations that "

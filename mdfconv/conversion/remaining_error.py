@@ -7,7 +7,7 @@ import numpy as np
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.problem import Problem, narrowest
+from mdfconv.fitting.problem import Problem, bounded_tangent, narrowest
 
 # 64 × 800 angles and what is computed there stay in the cache.
 _ROWS_AT_ONCE = 64
@@ -32,33 +32,28 @@ def remaining_error(
     metric : Metric
         Its signals S are compared, with its weight w, over the whole hemisphere.
     gamma : numpy.ndarray, shape (n,), optional
-        The second parameter of the target, if it differs from row to row.
+        The second parameter of the target, if it was fitted in each row.
 
     Returns
     -------
     rmse, max_error : numpy.ndarray, shape (n,)
         √(∫ (S_t − S_s)² w dβ / ∫ S_s² w dβ), and max |S_t − S_s| / max |S_s|.
     """
-    if gamma is not None:
-        columns = [
-            _compare(source, parameter[[row]], target.with_gamma(gamma[row]), result[[row]], metric)
-            for row in range(parameter.size)
-        ]
-    else:
-        columns = [
-            _compare(source, parameter[rows], target, result[rows], metric)
-            for rows in _blocks(parameter.size)
-        ]
+    columns = []
+    for rows in _blocks(parameter.size):
+        sources = source, parameter[rows]
+        if gamma is None:
+            shaped = target
+            widths = narrowest(*sources, target, result[rows])
+        else:
+            # A free γ makes the target as wide as the source.
+            shaped = target.with_gammas(gamma[rows, None])
+            widths = np.arctan(bounded_tangent(*sources))
+        every = np.arange(widths.size)
+        problem = Problem(*sources, shaped, metric, metric.quadrature(widths), every)
+        columns.append(np.stack(problem.relative_error(result[rows])))
     rmse, maximum = np.concatenate([np.zeros((2, 0)), *columns], axis=1)
     return rmse, maximum
-
-
-def _compare(
-    source: Distribution, parameter: Array, target: Distribution, result: Array, metric: Metric
-) -> Array:
-    quadrature = metric.quadrature(narrowest(source, parameter, target, result))
-    problem = Problem(source, parameter, target, metric, quadrature, np.arange(parameter.size))
-    return np.stack(problem.relative_error(result))
 
 
 def _blocks(size: int) -> list[slice]:

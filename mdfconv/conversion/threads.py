@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.evaluation import Array
+from mdfconv.distributions.evaluation import (
+    PARTS_A_THREAD,
+    WORTH_THREADS,
+    Array,
+    check_threads,
+)
 from mdfconv.errors import MdfconvError
-
-# Smaller arrays are converted sooner than threads are started.
-_WORTH_IT = 1 << 20
-_PARTS_A_THREAD = 4
 
 
 def in_threads(function: Callable[[Any], Array], values: Any, threads: int) -> Array:
@@ -33,13 +34,12 @@ def in_threads(function: Callable[[Any], Array], values: Any, threads: int) -> A
     MdfconvError
         If the number of threads makes no sense, or as the function does for all of the values.
     """
-    if threads < 1:
-        raise MdfconvError(f"{threads} threads: at least 1")
+    check_threads(threads)
     size = np.size(values)
-    if threads == 1 or size < _WORTH_IT:
+    if threads == 1 or size < WORTH_THREADS:
         return function(values)
     flat, result = values.reshape(-1), np.empty(size)
-    ends = np.linspace(0, size, threads * _PARTS_A_THREAD + 1).astype(int).tolist()
+    ends = np.linspace(0, size, threads * PARTS_A_THREAD + 1).astype(int).tolist()
 
     def compute(low: int, high: int) -> None:
         result[low:high] = function(flat[low:high])

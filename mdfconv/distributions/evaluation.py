@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -28,6 +29,9 @@ _LARGEST_BLOCK = 65536
 _SMALLEST_BLOCK = 512
 # Smaller arrays get smaller blocks, so that the intermediates stay a fraction of the result.
 _BLOCKS_AT_LEAST = 24
+# Smaller arrays are done sooner than threads are started; a few parts for each thread even out
+# what the others are kept from.
+WORTH_THREADS, PARTS_A_THREAD = 1 << 20, 4
 
 
 def as_operand(values: ArrayLike) -> Any:
@@ -72,7 +76,7 @@ def computing_dtype(*operands: Any) -> tuple[np.dtype[Any], np.dtype[Any]]:
     return dtype, dtype
 
 
-def evaluate(kernel: Kernel, beta: ArrayLike, *operands: ArrayLike) -> Any:
+def evaluate(kernel: Kernel, beta: ArrayLike, *operands: ArrayLike, threads: int = 1) -> Any:
     """Evaluate a kernel over the broadcast of an angle and its parameters.
 
     Parameters
@@ -86,12 +90,15 @@ def evaluate(kernel: Kernel, beta: ArrayLike, *operands: ArrayLike) -> Any:
         faces away from the surface and the value is 0.
     *operands : array_like
         Parameters that broadcast against `beta`.
+    threads : int
+        How many share the blocks of a large array.
 
     Returns
     -------
     numpy.ndarray or numpy scalar
         The values, in the broadcast shape.
     """
+    check_threads(threads)
     inputs = [as_operand(beta), *(as_operand(operand) for operand in operands)]
     dtype, result_dtype = computing_dtype(*inputs)
     arrays = [np.asarray(value) for value in inputs]
@@ -102,28 +109,47 @@ def evaluate(kernel: Kernel, beta: ArrayLike, *operands: ArrayLike) -> Any:
         raise MdfconvError(f"shapes {shapes} do not broadcast against each other") from None
     iterator = np.nditer(  # type: ignore[call-overload]
         [*arrays, None],
-        flags=["external_loop", "buffered", "zerosize_ok"],
+        flags=["external_loop", "buffered", "zerosize_ok", "ranged"],
         op_flags=[["readonly"]] * len(arrays) + [["writeonly", "allocate"]],
         op_dtypes=[dtype] * (len(arrays) + 1),
         casting="same_kind",
         buffersize=min(_LARGEST_BLOCK, max(_SMALLEST_BLOCK, size // _BLOCKS_AT_LEAST)),
     )
-    horizon = dtype.type(np.pi / 2)
-    # Read as integers, floats from 0 to π/2 keep their order and all others (negative, NaN)
-    # are larger: one reduction shows that nothing needs a closer look.
-    bits = np.dtype(f"u{dtype.itemsize}")
-    with iterator, np.errstate(all="ignore"):
-        for *blocks, out in iterator:
-            angle, *rest = blocks
-            kernel(angle, *(b[:1] if b.strides[0] == 0 else b for b in rest), out)
-            if angle.view(bits).max() > horizon.view(bits):
-                out[np.abs(angle) > horizon] = 0
+    with iterator:
+        if threads > 1 and size >= WORTH_THREADS:
+            ends = np.linspace(0, size, threads * PARTS_A_THREAD + 1).astype(int).tolist()
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(partial(_run, kernel, iterator), ends[:-1], ends[1:]))
+        else:
+            _run(kernel, iterator, 0, size)
         result: Any = iterator.operands[-1]
     if result.dtype == result_dtype:
         return result[()]
     # A mirror's D(0) overflows float16: inf is the answer, not an accident.
     with np.errstate(over="ignore"):
         return result.astype(result_dtype)[()]
+
+
+def _run(kernel: Kernel, iterator: Any, start: int, end: int) -> None:
+    """Evaluate a kernel on a part of an iterator's range."""
+    part = iterator.copy()
+    part.iterrange = start, end
+    # Read as integers, floats from 0 to π/2 keep their order and all others (negative, NaN)
+    # are larger: one reduction shows that nothing needs a closer look.
+    horizon = part.dtypes[-1].type(np.pi / 2)
+    bits = np.dtype(f"u{horizon.itemsize}")
+    with part, np.errstate(all="ignore"):
+        for *blocks, out in part:
+            angle, *rest = blocks
+            kernel(angle, *(b[:1] if b.strides[0] == 0 else b for b in rest), out)
+            if angle.view(bits).max() > horizon.view(bits):
+                out[np.abs(angle) > horizon] = 0
+
+
+def check_threads(threads: int) -> None:
+    """Raise MdfconvError unless so many threads can run."""
+    if threads < 1:
+        raise MdfconvError(f"{threads} threads: at least 1")
 
 
 def inverse_square(values: Array) -> Array:

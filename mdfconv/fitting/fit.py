@@ -17,6 +17,7 @@ import numpy as np
 
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Indices
+from mdfconv.fitting.interpolation import WORTH_IT, interpolated
 from mdfconv.fitting.maps import StoredFit
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.problem import Problem, near_problem
@@ -93,14 +94,34 @@ def fit(
         if np.isnan(found.parameter).any():
             return cold_fit(source, parameter, target, metric, quadrature)
         return found
-    found = warm_fit(source, parameter, target, metric)
-    best, distance = found.parameter, found.distance
-    for search, most_left in ((_between_knots, _KNOTS), (cold_fit, 0)):
-        rest = np.flatnonzero(np.isnan(best))
+    nowhere = _nowhere(parameter.size, target)
+    best, distance = nowhere.parameter, nowhere.distance
+    for search, most_left in _SEARCHES:
+        rest = np.flatnonzero(np.isnan(best) & (distance != np.inf))
         if rest.size > most_left:
             found = search(source, parameter[rest], target, metric)
             best[rest], distance[rest] = found.parameter, found.distance
     return _with_limits(best, distance, target)
+
+
+def _among_many(
+    source: Distribution, parameter: Array, target: Distribution, metric: Metric
+) -> Fit:
+    """Fit where fits of fewer values lie on a smooth curve: NaN elsewhere.
+
+    The distance is infinite where there are no fits around.
+    """
+    x = np.log(parameter)
+    if not np.ptp(x) > 0:
+        return _nowhere(parameter.size, target)
+
+    def some(x: Array) -> Array:
+        fits = fit(source, np.clip(np.exp(x), parameter.min(), parameter.max()), target, metric)
+        return np.stack([np.log(fits.parameter), fits.distance])
+
+    (log_best, distance), nowhere = interpolated(some, x)
+    best = np.minimum(np.exp(log_best), target.parameter.upper)
+    return _with_limits(best, np.where(nowhere, np.inf, distance), target)
 
 
 def warm_fit(source: Distribution, parameter: Array, target: Distribution, metric: Metric) -> Fit:
@@ -300,3 +321,7 @@ def _minimum(problem: Problem) -> tuple[Array, Array]:
         if not problem.target.parameter.upper_closed:
             ends = np.minimum(ends, coarse[:, -1])
         return np.where(ends < _CLEARLY_LOWER * distance, np.nan, best), distance
+
+
+# How a fit is found, and how many there must be for that to pay; the first that answers does.
+_SEARCHES = ((_among_many, WORTH_IT), (warm_fit, 0), (_between_knots, _KNOTS), (cold_fit, 0))

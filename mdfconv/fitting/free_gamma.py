@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Indices, Mask
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.fit import descend
+from mdfconv.fitting.least_squares import least_squares
 from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.problem import near_problem
-from mdfconv.fitting.quadrature import Quadrature
+from mdfconv.fitting.problem import Problem, bounded_tangent
+from mdfconv.fitting.quadrature import Quadrature, SmoothQuadrature
 from mdfconv.fitting.scan import candidates
 
 # The distance left by the best first parameter has one minimum over γ, and is smooth: 13 values
@@ -21,7 +22,10 @@ from mdfconv.fitting.scan import candidates
 _SCANNED = 13
 # Kinks stay where they were while both parameters are found: the next pass puts them right.
 _PASSES = 3
-_TOLERANCE = 1e-13
+# A start need not be as near as where one parameter alone is found: every other candidate will do.
+_EVERY = 2
+# The candidates of a scan, 90 × 76 angles a row, stay in the cache.
+_BATCH = 64
 # Nearer than this share to an end of the range, γ is at the end.
 _AT_END = 1e-3
 
@@ -71,12 +75,12 @@ def fit_free_gamma(
     shape = target.second_parameter
     if shape is None:
         raise MdfconvError(f"{target.name} has one parameter and no γ")
-    start = _start(source, parameter, target, metric, quadrature)
-    rows = [
-        _fit_row(source, parameter[[row]], target, metric, _row_of(quadrature, row), start[row])
-        for row in range(parameter.size)
+    rows = np.arange(parameter.size)
+    parts = [
+        _fit_batch(source, parameter, target, metric, quadrature, rows[at : at + _BATCH])
+        for at in range(0, parameter.size, _BATCH)
     ]
-    best, gamma, distance = np.array(rows).reshape(-1, 3).T
+    best, gamma, distance = np.concatenate(parts or [np.empty((3, 0))], axis=1)
     return FreeFit(best, gamma, distance, np.isin(gamma, shape.fit_range))
 
 
@@ -86,78 +90,67 @@ def _start(
     target: Distribution,
     metric: Metric,
     quadrature: Quadrature | None,
+    rows: Indices,
 ) -> Array:
     """Return ln p and ln γ of the lowest of many candidates, shape (n, 2), inside the bounds."""
-    rows = np.arange(parameter.size)
-    lowest, start = np.full(parameter.size, np.inf), np.zeros((parameter.size, 2))
+    every = np.arange(rows.size)
+    lowest, start = np.full(rows.size, np.inf), np.zeros((rows.size, 2))
     low, high = np.log(target.parameters[1].fit_range)
     for log_gamma in np.linspace(low, high, _SCANNED):
         shaped = target.with_gamma(float(np.exp(log_gamma)))
-        width = shaped.from_half_tangent(source.half_tangent(parameter))
-        problem = near_problem(source, parameter, shaped, width, metric, quadrature)
+        problem = Problem(source, parameter, shaped, metric, quadrature, rows)
         with np.errstate(all="ignore"):
-            every = candidates(problem)
-            distance = problem.coarse_distance(every)
+            scanned = candidates(problem)[:, ::_EVERY]
+            distance = problem.coarse_distance(scanned)
         column = np.nanargmin(distance, axis=1)
-        lower = distance[rows, column] < lowest
-        lowest[lower] = distance[rows, column][lower]
-        start[lower] = np.stack([np.log(every[rows, column]), np.full(rows.size, log_gamma)], 1)[
-            lower
-        ]
+        best = np.stack([np.log(scanned[every, column]), np.full(rows.size, log_gamma)], axis=1)
+        lower = distance[every, column] < lowest
+        lowest[lower], start[lower] = distance[every, column][lower], best[lower]
     start[:, 0] = np.minimum(start[:, 0], np.log(target.parameter.upper) - _AT_END)
     start[:, 1] = np.clip(start[:, 1], low + _AT_END, high - _AT_END)
     return start
 
 
-def _fit_row(
+def _fit_batch(
     source: Distribution,
     parameter: Array,
     target: Distribution,
     metric: Metric,
     quadrature: Quadrature | None,
-    x: Array,
-) -> tuple[float, float, float]:
-    """Return the first parameter, γ and the distance of the best fit of one problem."""
+    rows: Indices,
+) -> Array:
+    """Return the first parameters, γ and distances of some of the fits, shape (3, rows)."""
     fit_range = target.parameters[1].fit_range
-    low, high = np.log(fit_range).tolist()
-    for _ in range(_PASSES):
-        near = target.with_gamma(float(np.exp(x[1])))
-        problem = near_problem(source, parameter, near, np.exp(x[:1]), metric, quadrature)
-        residual = problem.residual(np.exp(x[:1]))
-        found = least_squares(
-            lambda at, residual=residual: residual(
-                target.with_gamma(float(np.exp(at[1]))), float(np.exp(at[0]))
-            ),
-            x,
-            bounds=([-np.inf, low], [np.log(target.parameter.upper), high]),
-            xtol=_TOLERANCE,
-            ftol=_TOLERANCE,
-            gtol=_TOLERANCE,
-        )
-        x = found.x
-    for end, log_end in zip(fit_range, (low, high), strict=True):
-        if abs(x[1] - log_end) < _AT_END:
-            near = target.with_gamma(end)
-            problem = near_problem(source, parameter, near, np.exp(x[:1]), metric, quadrature)
-            best, distance = descend(problem, np.exp(x[:1]))
-            return float(best[0]), end, float(distance[0])
-    return float(np.exp(x[0])), float(np.exp(x[1])), 2 * float(found.cost)
+    low = np.array([-np.inf, np.log(fit_range[0])])
+    high = np.log([target.parameter.upper, fit_range[1]])
+    if quadrature is None and metric.over_angles:
+        # The best lobes are about as wide as the source's.
+        parameter, rows = parameter[rows], np.arange(rows.size)
+        quadrature = SmoothQuadrature(np.arctan(bounded_tangent(source, parameter)))
+    x = _start(source, parameter, target, metric, quadrature, rows)
+
+    def problem(shaped: Distribution, some: Indices) -> Problem:
+        return Problem(source, parameter, shaped, metric, quadrature, rows[some])
+
+    every = np.arange(rows.size)
+    for _ in range(_PASSES if metric.kinks else 1):
+        near = problem(target.with_gammas(np.exp(x[:, 1:])), every)
+        x, distance = least_squares(_residual(near, target, x), x, low, high)
+    best, gamma = np.exp(x).T
+    for end in fit_range:
+        there = np.flatnonzero(np.abs(x[:, 1] - np.log(end)) < _AT_END)
+        if there.size:
+            gamma[there] = end
+            at_end = problem(target.with_gamma(end), there)
+            best[there], distance[there] = descend(at_end, best[there])
+    return np.stack([best, gamma, distance])
 
 
-def _row_of(quadrature: Quadrature | None, row: int) -> Quadrature | None:
-    return None if quadrature is None else _OneRow(quadrature, row)
+def _residual(near: Problem, target: Distribution, x: Array) -> Callable[[Array], Array]:
+    """Return the residuals as a function of ln p and ln γ, on the samples for some of them."""
+    residual = near.residual(np.exp(x[:, 0]))
 
+    def of_logarithms(x: Array) -> Array:
+        return residual(target.with_gammas(np.exp(x[:, 1:])), np.exp(x[:, 0]))
 
-class _OneRow:
-    """A quadrature's single problem, as a batch of its own."""
-
-    def __init__(self, quadrature: Quadrature, row: int) -> None:
-        self._quadrature, self._row = quadrature, np.array([row])
-
-    def nodes(
-        self, rows: Indices, kinks: Array | None = None, edges: Array | None = None
-    ) -> tuple[Array, Array]:
-        return self._quadrature.nodes(self._row, kinks, edges)
-
-    def coarse(self, rows: Indices, *, fine: bool = False) -> tuple[Array, Array]:
-        return self._quadrature.coarse(self._row, fine=fine)
+    return of_logarithms

@@ -117,20 +117,20 @@ class Problem:
         distance = np.einsum("ij,ij,ij->i", weight, value, value) - np.square(step) * curvature
         return step, distance
 
-    def residual(self, parameter: Array) -> Callable[[Distribution, float], Array]:
-        """Return √w ΔS as a function of a target and its parameter, on samples that stay.
+    def residual(self, parameter: Array) -> Callable[[Distribution, Array], Array]:
+        """Return √w ΔS, shape (m, k), as a function of a target and its parameters.
 
         Parameters
         ----------
-        parameter : numpy.ndarray, shape (1,)
-            That of the target for which the samples are placed, in a batch of one.
+        parameter : numpy.ndarray, shape (m,)
+            Those of the target for which the samples are placed; there they stay.
         """
-        beta, weight, signal = self._samples_for(parameter[:, None], np.zeros(1, int))
-        root = np.sqrt(weight[0])
+        beta, weight, signal = self._samples_for(parameter[:, None], np.arange(self.size))
+        root = np.sqrt(weight)
 
-        def residual(target: Distribution, parameter: float) -> Array:
-            value = self.metric.signal(target, beta, np.array([[parameter]]), self._peak)
-            difference: Array = root * (value[0] - signal[0])
+        def residual(target: Distribution, parameter: Array) -> Array:
+            value = self.metric.signal(target, beta, parameter[:, None], self._peak)
+            difference: Array = root * (value - signal)
             return difference
 
         return residual

@@ -10,7 +10,6 @@ import mdfconv
 from mdfconv.distributions import one_parameter_distributions
 from mdfconv.fitting import maps
 from mdfconv.fitting.fit import cold_fit, fit
-from mdfconv.fitting.free_gamma import fit_free_gamma
 from mdfconv.fitting.metrics import list_metrics, metric_named
 from mdfconv.fitting.metrics.display import Display
 from mdfconv.fitting.metrics.energy import Energy
@@ -231,19 +230,6 @@ def test_gtr_with_fixed_gamma():
     )
     back = fit(GTR(3.5), values, GTR(3.5), Display()).parameter
     np.testing.assert_allclose(back, values, rtol=1e-8)
-
-
-def test_gtr_with_free_gamma():
-    found = fit_free_gamma(GTR(3), np.array([0.2]), GTR(), Energy())
-    assert found.parameter[0] == pytest.approx(0.2, rel=1e-4)
-    assert found.gamma[0] == pytest.approx(3, rel=1e-4)
-    assert abs(found.distance[0]) < 1e-12
-    assert not found.at_limit[0]
-    # A Gaussian slope distribution is GTR's limit for γ → ∞.
-    limited = fit_free_gamma(mdfconv.distribution("beckmann"), np.array([0.2]), GTR(), Unit())
-    assert (limited.gamma[0], limited.at_limit[0]) == (64, True)
-    with pytest.raises(ValueError, match="ggx has one parameter"):
-        fit_free_gamma(GTR(3), np.array([0.2]), mdfconv.distribution("ggx"), Unit())
 
 
 def test_samples_are_used_as_they_are():

@@ -19,6 +19,7 @@ from mdfconv.cli.options import (
     GammaOption,
     MethodOption,
     OptionalMetricOption,
+    SpecularOption,
     ToOption,
     asked_metric,
     chosen_gamma,
@@ -37,7 +38,7 @@ from mdfconv.cli.tables import (
 )
 from mdfconv.conversion import Conversion, explain, list_methods
 from mdfconv.conversion.arrays import FREE, Gamma
-from mdfconv.conversion.endpoint import endpoint
+from mdfconv.conversion.endpoint import endpoint, with_specular
 from mdfconv.conversion.explanation import results_and_cautions
 from mdfconv.distributions import list_distributions, one_parameter_distributions
 from mdfconv.distributions.parameter import number_text
@@ -64,6 +65,7 @@ def command(
     metric: OptionalMetricOption = None,
     exposure: ExposureOption = None,
     gamma: GammaOption = None,
+    specular: SpecularOption = None,
     format_: FormatOption = None,
 ) -> None:
     """Convert parameters from one distribution to another.
@@ -81,6 +83,8 @@ def command(
 
     mdfconv convert --from beckmann --to ggx --metric environment 0.2
 
+    mdfconv convert --from blinn-phong:obj2gltf --to ggx:roughness --metric environment 0.9
+
     mdfconv convert --from beckmann --to gtr --gamma free --metric energy 0.2
 
     mdfconv convert --from ashikhmin-shirley --to ggx 100,20
@@ -92,6 +96,7 @@ def command(
     form = form_of(format_, in_pipe=Format.plain)
     rule = _Rule(method, asked_metric(metric, exposure), exposure, chosen_gamma(gamma))
     every = target.strip().lower() == _EVERY
+    source, target = with_specular(source, source if every else target, specular)
     if form is Format.plain and not every and rule.gamma != FREE:
         _stream(read_blocks(values), source, target, rule)
         return

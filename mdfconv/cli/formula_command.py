@@ -12,6 +12,7 @@ from mdfconv.cli.options import (
     FormatOption,
     FromOption,
     MetricOption,
+    SpecularOption,
     ToOption,
     chosen_metric,
     fixed_gamma,
@@ -44,6 +45,7 @@ def command(
     metric: MetricOption = "environment",
     exposure: ExposureOption = None,
     gamma: FixedGammaOption = None,
+    specular: SpecularOption = None,
     language: Annotated[
         str, typer.Option("--lang", metavar="LANG", help="glsl, hlsl, c, python or latex.")
     ] = "glsl",
@@ -71,13 +73,13 @@ def command(
 
     mdfconv formula --from blinn-phong --to ggx --metric energy --all --lang latex
     """
-    from mdfconv.conversion.endpoint import endpoints
+    from mdfconv.conversion.endpoint import endpoints, with_specular
     from mdfconv.formula import LANGUAGES, Problem, cheapest, write_formula
 
     if format_ and not every:
         raise MdfconvError("--format is the form of the table of --all; a formula has --lang")
     LANGUAGES[language]  # names are wrong more often than ranges
-    ends = endpoints(source, target, fixed_gamma(gamma))
+    ends = endpoints(*with_specular(source, target, specular), fixed_gamma(gamma))
     low, high = ends[0].stored.typical if range_ is None else _range(range_)
     problem = Problem(*ends, chosen_metric(metric, exposure), low, high)
     if every:

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli.material_files import (
+    InPlaceOption,
+    ReportFormat,
+    ReportFormatOption,
+    ResultOption,
+    convert_files,
+    number_cell,
+)
 from mdfconv.cli.options import ExposureOption, MetricOption, chosen_metric
-from mdfconv.cli.tables import ROWS_SHOWN, print_table, progress, rich_table, tell, tell_rest
+from mdfconv.cli.tables import ROWS_SHOWN, print_table, progress, rich_table, tell_rest
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
     from mdfconv.fitting.metrics import Metric
+    from mdfconv.scene.material_files import Destination
     from mdfconv.scene.mtl import Material, MtlConversion
-    from mdfconv.scene.mtl_files import Destination
-
-
-class ReportFormat(StrEnum):
-    """The forms of the report on what was converted."""
-
-    table = "table"
-    json = "json"
 
 
 def command(
@@ -34,10 +35,7 @@ def command(
             metavar="IN.mtl...", help="Material libraries, or patterns such as '*.mtl'."
         ),
     ],
-    output: Annotated[
-        str | None,
-        typer.Option("--output", "-o", metavar="OUT", help="New file, or a folder that exists."),
-    ] = None,
+    output: ResultOption = None,
     to: Annotated[
         str,
         typer.Option(
@@ -49,10 +47,7 @@ def command(
     replace: Annotated[
         bool, typer.Option("--replace", help="Drop the statement that was converted.")
     ] = False,
-    in_place: Annotated[
-        bool,
-        typer.Option("--in-place", help="Change the library itself; the original is kept as .bak."),
-    ] = False,
+    in_place: InPlaceOption = False,
     textures: Annotated[
         bool,
         typer.Option(
@@ -67,12 +62,7 @@ def command(
         bool,
         typer.Option("--compare", help="Add what importers' rules make of Ns, and their error."),
     ] = False,
-    format_: Annotated[
-        ReportFormat,
-        typer.Option(
-            "--format", help="Report: table on standard error or json on standard output."
-        ),
-    ] = ReportFormat.table,
+    format_: ReportFormatOption = ReportFormat.table,
 ) -> None:
     """Convert the shininess of Wavefront material libraries to roughness, or back.
 
@@ -91,44 +81,33 @@ def command(
     mdfconv mtl --to shininess chair-pbr.mtl -o chair-phong.mtl
     """
     from mdfconv.scene.mtl import convert_mtl
-    from mdfconv.scene.mtl_files import (
-        choose_outputs,
-        find_libraries,
-        read_library,
-        write_libraries,
-    )
 
     wanted = to.strip().lower()
     if wanted != "roughness" and (compare or textures):
         raise MdfconvError("--compare and --textures go with --to roughness")
     kept = chosen_metric(metric, exposure)
-    converted = []
-    problems: list[tuple[Path, int, str]] = []
-    for destination in choose_outputs(find_libraries(libraries), output, in_place=in_place):
-        data = read_library(destination.source)
-        names: dict[str, str] = {}
-        if textures:
-            names, failures = _convert_textures(destination, data, kept, exponent_max)
-            problems += [(destination.source, *failure) for failure in failures]
-        conversion = convert_mtl(data, wanted, metric=kept, replace=replace, texture_names=names)
-        converted.append((destination, data, conversion))
-    written = write_libraries(converted)
-    _report(converted, kept, form=format_, compare=compare)
-    for destination, _, conversion in converted:
-        problems += [(destination.source, *problem) for problem in conversion.problems]
-        tell(
-            f"{'wrote' if destination in written else 'nothing to change in'} {destination.output}"
+
+    def convert(destination: Destination, data: bytes) -> MtlConversion:
+        names, files, problems = (
+            _convert_textures(destination, data, kept, exponent_max) if textures else ({}, {}, [])
         )
-    for path, line, text in problems:
-        tell(f"{path}:{line}: {text}: left as it is")
-    if problems:
-        raise typer.Exit(1)
+        conversion = convert_mtl(data, wanted, metric=kept, replace=replace, texture_names=names)
+        every = (*problems, *conversion.problems)
+        return dataclasses.replace(conversion, files=files, problems=every)
+
+    convert_files(
+        libraries,
+        output,
+        in_place=in_place,
+        convert=convert,
+        report=lambda converted: _report(converted, kept, form=format_, compare=compare),
+    )
 
 
 def _convert_textures(
     destination: Destination, data: bytes, metric: Metric, exponent_max: float
-) -> tuple[dict[str, str], list[tuple[int, str]]]:
-    """Convert the textures of a library; return their new names, and problems by line."""
+) -> tuple[dict[str, str], dict[Path, bytes], list[tuple[int, str]]]:
+    """Convert the textures of a library; return new names, new files, and problems by line."""
     from mdfconv.scene.mtl import texture_statements
     from mdfconv.scene.mtl_textures import convert_textures
 
@@ -139,14 +118,12 @@ def _convert_textures(
 
 
 def _report(
-    converted: list[tuple[Destination, bytes, MtlConversion]],
+    converted: list[tuple[Destination, MtlConversion]],
     metric: Metric,
     *,
     form: ReportFormat,
     compare: bool,
 ) -> None:
-    from mdfconv.scene.shininess import IMPORTER_RULES
-
     records = [
         {
             "file": str(destination.source),
@@ -156,13 +133,15 @@ def _report(
             "textures": [vars(texture) for texture in conversion.textures],
             "problems": [{"line": line, "problem": text} for line, text in conversion.problems],
         }
-        for destination, _, conversion in converted
+        for destination, conversion in converted
     ]
     if form is ReportFormat.json:
         typer.echo(json_text(records))
         return
     for record in records:
-        _print_table(record, list(IMPORTER_RULES) if compare else [])
+        _print_table(record)
+        if compare:
+            _print_importers(record)
 
 
 def _rows(
@@ -178,27 +157,28 @@ def _rows(
 
         exponents = np.array([material.shininess for material in materials])
         for row, results in zip(rows, importer_results(exponents, metric), strict=True):
-            row |= {r.rule: {"roughness": r.roughness, "rmse": r.rmse} for r in results}
+            row["importers"] = {
+                r.importer: {"roughness": r.roughness, "rmse": r.rmse} for r in results
+            }
     return rows
 
 
-def _print_table(record: dict[str, Any], rules: list[str]) -> None:
+def _print_table(record: dict[str, Any]) -> None:
     """Print what was converted to standard error."""
     rows = record["materials"]
     shown = [
         {
             "material": row["name"],
-            "Ns": _number(row["shininess"], 6),
-            "Pr": _number(row["roughness"], 6),
-            "RMSE": _number(row["rmse"], 3),
-            **{rule: _importer(row[rule]) for rule in rules},
+            "Ns": number_cell(row["shininess"], 6),
+            "Pr": number_cell(row["roughness"], 6),
+            "RMSE": number_cell(row["rmse"], 3),
             "notes": "; ".join(row["notes"]),
         }
         for row in rows[:ROWS_SHOWN]
     ]
     if shown:
         title = f"{record['file']}, {record['metric']} metric"
-        right = ["Ns", "Pr", "RMSE", *rules]
+        right = ["Ns", "Pr", "RMSE"]
         print_table(rich_table(list(shown[0]), shown, title, right=right), err=True)
     else:
         typer.echo(f"{record['file']}: nothing to convert", err=True)
@@ -207,10 +187,19 @@ def _print_table(record: dict[str, Any], rules: list[str]) -> None:
         typer.echo(f"{texture['keyword']} {texture['file']} (line {texture['line']})", err=True)
 
 
-def _number(value: float, digits: int) -> str:
-    return "—" if math.isnan(value) else f"{value:.{digits}g}"
-
-
-def _importer(result: dict[str, float]) -> str:
-    mirror = math.isinf(result["rmse"])
-    return f"{result['roughness']:.3g} ({'a mirror' if mirror else _number(result['rmse'], 2)})"
+def _print_importers(record: dict[str, Any]) -> None:
+    """Print what importers make of each material to standard error."""
+    rows = [
+        {
+            "material": row["name"],
+            "importer": name,
+            "roughness": number_cell(result["roughness"], 3),
+            "RMSE": "a mirror" if math.isinf(result["rmse"]) else number_cell(result["rmse"], 3),
+        }
+        for row in record["materials"]
+        for name, result in row["importers"].items()
+    ]
+    if rows:
+        table = rich_table(list(rows[0]), rows[:ROWS_SHOWN], "Importers", right=list(rows[0])[2:])
+        print_table(table, err=True)
+        tell_rest(len(rows), "--format json")

@@ -116,6 +116,15 @@ GammaOption = Annotated[
 FixedGammaOption = Annotated[
     str | None, typer.Option("--gamma", metavar="G", help=f"{_GAMMA_HELP}.")
 ]
+SpecularOption = Annotated[
+    float | None,
+    typer.Option(
+        "--specular",
+        metavar="L",
+        help="Weight of the specular lobe or luminance of Ks, above 0 to 1, where a program's rule "
+        "depends on it (mdfconv list --encodings).",
+    ),
+]
 FormatOption = Annotated[
     Format | None,
     typer.Option(

@@ -14,6 +14,7 @@ from mdfconv.cli.options import (
     MethodOption,
     MetricOption,
     PngOption,
+    SpecularOption,
     chosen_metric,
     fixed_gamma,
 )
@@ -59,6 +60,7 @@ def command(
     metric: MetricOption = "environment",
     exposure: ExposureOption = None,
     gamma: FixedGammaOption = None,
+    specular: SpecularOption = None,
     exponent_max: Annotated[
         float, typer.Option(metavar="N", help="Exponent of the brightest texel, for exponent.")
     ] = 1000.0,
@@ -91,16 +93,18 @@ def command(
 
     mdfconv texture rough.tif -o gloss.tif --from ggx:roughness --to beckmann:glossiness
 
+    mdfconv texture wrong.png -o right.png --from blinn-phong:obj2gltf --to ggx:roughness
+
     mdfconv texture orm.png -o new.png --channel g --from ggx:roughness --to ggx:alpha --depth 8
     """
+    from mdfconv.conversion.endpoint import with_specular
     from mdfconv.scene.texture import convert_texture_file
     from mdfconv.scene.texture_rule import TextureRule
 
     if png:
         check_outputs(png, output, inputs=[source_file])
     rule = TextureRule(
-        source,
-        target,
+        *with_specular(source, target, specular),
         method,
         str(chosen_metric(metric, exposure)),
         exponent_max,

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdfconv.distributions import Distribution, distribution
-from mdfconv.distributions.evaluation import Array
+from mdfconv.distributions.dialects import Specular, dialects_of
+from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.distributions.parameter import Encoding, Parameter
 from mdfconv.errors import MdfconvError
 from mdfconv.registry import unknown_name
@@ -47,6 +48,7 @@ class Endpoint:
 
     def decode(self, values: ArrayLike) -> Array:
         """Return the parameters (float64) for stored values; raise if one is illegal."""
+        self._check_clamps(values)
         stored = np.asarray(self.stored.check(values, self.label), dtype=np.float64)
         parameter = self.encoding.decode(stored) if self.encoding else stored
         checked: Array = np.asarray(
@@ -57,6 +59,8 @@ class Endpoint:
     def decode_legal(self, values: Array) -> Array:
         """Return the parameters for stored values (float64); NaN for those that are illegal."""
         legal = self.stored.accepts(values)
+        if self.encoding:
+            legal &= ~self.encoding.clamped(values)
         stored = values if legal.all() else np.where(legal, values, np.nan)
         if not self.encoding:
             return stored
@@ -69,7 +73,24 @@ class Endpoint:
             return parameter
         with np.errstate(invalid="ignore"):
             stored = self.encoding.encode(parameter)
-        return np.where(self.stored.accepts(stored), stored, np.nan)
+        accepted = self.stored.accepts(stored) | self.encoding.clamped(stored)
+        return np.where(accepted, stored, np.nan)
+
+    def clamped(self, stored: Array) -> dict[str, Mask]:
+        """Return what stored numbers stand for that have no inverse, in words, and which they are.
+
+        Such a word is ``"r = 0 is any N ≥ 1000"``.
+        """
+        if not self.encoding:
+            return {}
+        symbols = self.stored.symbol, self.distribution.parameter.symbol
+        return {clamp.text(*symbols): stored == clamp.stored for clamp in self.encoding.clamps}
+
+    def _check_clamps(self, values: ArrayLike) -> None:
+        stored = np.asarray(values)
+        for text, which in self.clamped(stored).items():
+            if np.any(which):
+                raise MdfconvError(f"{self.label} has no inverse here: {text}")
 
 
 def endpoint(name: str | Endpoint) -> Endpoint:
@@ -135,18 +156,59 @@ def with_gamma(end: Endpoint, gamma: float | None) -> Endpoint:
     return replace(end, distribution=end.distribution.with_gamma(gamma))
 
 
+def with_specular(source: str, target: str, specular: float | None) -> tuple[str, str]:
+    """Return the names of both ends, with a specular weight for those that depend on it.
+
+    Parameters
+    ----------
+    source, target : str
+        As `endpoint` takes them.
+    specular : float or None
+        The weight of the specular lobe, or the luminance of its colour; None changes nothing.
+
+    Raises
+    ------
+    MdfconvError
+        If none of them depends on it.
+    """
+    if specular is None:
+        return source, target
+    depend = [_takes_specular(name) for name in (source, target)]
+    if not any(depend):
+        raise MdfconvError(
+            f"neither {source} nor {target} depends on a specular weight", argument="specular"
+        )
+    setting = f":{specular!r}"
+    return source + setting * depend[0], target + setting * depend[1]
+
+
+def _takes_specular(name: str) -> bool:
+    head, _, tail = name.partition(":")
+    dialect = dialects_of(distribution(head).name).get(tail.strip().lower())
+    return dialect is not None and dialect.specular is not Specular.no
+
+
+def encodings_of(owner: Distribution) -> list[str]:
+    """Return the names of the forms in which a distribution's parameter is stored."""
+    # Exponents are not an α.
+    plain = [] if owner.parameter.larger_is_smoother else [DEFAULT_ENCODING]
+    own = [encoding.name for encoding in owner.encodings]
+    return [*plain, *own, *dialects_of(owner.name)]
+
+
 def _encoding(owner: Distribution, name: str) -> Encoding | None:
-    key = name.strip().lower()
-    known = {encoding.name: encoding for encoding in owner.encodings}
-    if not known:
+    key, _, setting = (part.strip().lower() for part in name.partition(":"))
+    known = encodings_of(owner)
+    if known in ([], [DEFAULT_ENCODING]):
         raise MdfconvError(
             f"{owner.name} has no encoding '{name}': its {owner.parameter.name} "
             f"{owner.parameter.symbol} is given as it is"
         )
-    # Exponents are not an α.
-    plain = [] if owner.parameter.larger_is_smoother else [DEFAULT_ENCODING]
-    if key in plain:
-        return None
     if key not in known:
-        raise unknown_name(f"encoding of {owner.name}", name, [*plain, *known])
-    return known[key]
+        raise unknown_name(f"encoding of {owner.name}", name, known)
+    dialect = dialects_of(owner.name).get(key)
+    if dialect:
+        return dialect.encoding(owner.parameter, setting)
+    if setting:
+        raise MdfconvError(f"{owner.name}:{key} takes no '{setting}'")
+    return {encoding.name: encoding for encoding in owner.encodings}.get(key)

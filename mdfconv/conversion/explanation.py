@@ -261,6 +261,8 @@ class _Table:
         """Return sentences, and which of the numbers they are true of."""
         every = np.ones(self._parameter.shape, bool)
         cautions = {end.caution: every for end in (self._source, self._target) if end.caution}
+        for text, which in self._target.clamped(self._stored).items():
+            cautions[f"{self._target.label} clamps: {text}"] = which
         if self._exact:
             return cautions
         pair = self._source.distribution, self._target.distribution

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mdfconv.distributions.evaluation import Array, as_operand
+from mdfconv.distributions.evaluation import Array, Mask, as_operand
 from mdfconv.errors import MdfconvError
 
 
@@ -111,6 +111,34 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Clamp:
+    """A stored number that stands for all parameters beyond one.
+
+    Parameters
+    ----------
+    stored : float
+        The number.
+    edge : float
+        The number up to which the rule holds: as a rule the same.
+    above : bool
+        Whether the parameters are those above the limit, or those below.
+    limit : float
+        The parameter that the rule has for the edge.
+    """
+
+    stored: float
+    edge: float
+    above: bool = True
+    limit: float = float("nan")
+
+    def text(self, stored: str, parameter: str) -> str:
+        """Return in words what the number stands for, such as ``"r = 0 is any N ≥ 1000"``."""
+        beyond = "≥" if self.above else "≤"
+        number, limit = number_text(self.stored), number_text(self.limit)
+        return f"{stored} = {number} is any {parameter} {beyond} {limit}"
+
+
+@dataclass(frozen=True)
 class Encoding:
     """The form in which artists or files store a distribution's parameter.
 
@@ -124,6 +152,8 @@ class Encoding:
         Stored value to parameter, and back; elementwise on arrays.
     formula : str
         The relation in words.
+    clamps : tuple of Clamp
+        Stored numbers that have no inverse.
     """
 
     name: str
@@ -131,6 +161,12 @@ class Encoding:
     decode: Callable[[Array], Array]
     encode: Callable[[Array], Array]
     formula: str
+    clamps: tuple[Clamp, ...] = ()
+
+    def clamped(self, values: Array) -> Mask:
+        """Return where stored numbers have no inverse, for they stand for many parameters."""
+        which: Mask = np.isin(values, [clamp.stored for clamp in self.clamps])
+        return which
 
 
 ROUGHNESS = Encoding(

@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 
 from mdfconv.conversion.endpoint import endpoints
 from mdfconv.distributions.evaluation import Array
@@ -15,8 +16,9 @@ from mdfconv.output.figures import PAGE, encoded, new_figure
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text, markdown_text, rounded_rows
 from mdfconv.reports.artefact import Artefact
+from mdfconv.scene.encodings import EXPONENTS, encoding_records
 from mdfconv.scene.shininess import (
-    IMPORTER_RULES,
+    IMPORTERS,
     ROUGHNESS,
     SHININESS,
     error_of,
@@ -25,48 +27,49 @@ from mdfconv.scene.shininess import (
 )
 
 _EXPONENTS = np.geomspace(1, 1e4, 81)
-_SHOWN = np.array([1.0, 3, 10, 30, 100, 300, 1000, 3000, 10000])
+# Of the roughness that is asked for.
+_ABOUT_RIGHT = 0.1
 _LIGHT = "environment"
 _OURS = _LIGHT, "energy", "display"
-_STYLES = {
-    "1 - Ns/1000": ("#0072B2", "-."),
-    "1 - sqrt(Ns/1000)": ("#E69F00", (0, (4, 2))),
-    "1 - sqrt(Ns)/10": ("#CC79A7", ":"),
+# Above the rules, in black and grey.
+_OUR_STYLES = {
     "environment": ("#000000", "-"),
-    "energy": ("#999999", (0, (5, 1))),
-    "display": ("#009E73", (0, (8, 2))),
+    "energy": ("#666666", (0, (5, 1))),
+    "display": ("#666666", ":"),
 }
+_DASHES = ("-", (0, (6, 2)), (0, (2, 1)), "-.")
 
 
 def importer_page() -> Artefact:
     """Return what importers make of a Wavefront exponent, beside the best fit."""
     curves = _columns(_EXPONENTS)
-    rows = [_shown(row) for row in rounded_rows(_columns(_SHOWN))]
+    ours, rules = _tables()
     prose = _PROSE.format(**_answer(), **_failures(curves))
+    tables = [f"## Every rule\n\n{_RULES}\n\n{markdown_text(list(rules[0]), rules)}"]
+    tables.append(f"## The answer\n\n{markdown_text(list(ours[0]), ours)}")
     files = {
         "importers.csv": file_bytes(csv_text(list(curves), rounded_rows(curves))),
-        "importers.md": file_bytes(f"{prose}\n\n{markdown_text(list(rows[0]), rows)}"),
+        "importers.md": file_bytes("\n\n".join([prose, *tables])),
         "importers.png": _draw(curves),
     }
-    at_100 = rows[int(np.flatnonzero(_SHOWN == 100)[0])]
-    by_rule = ", ".join(f"{at_100[rule]:g}" for rule in IMPORTER_RULES)
-    summary = f"at Ns = 100 the rules give roughness {by_rule}; natural light asks for "
+    at_100 = [rule["r at 100"] for rule in rules]
+    answer = float(roughness_of(np.array([100.0]), metric_named(_LIGHT))[0])
     return Artefact(
         files,
         "what becomes of Ns in a renderer with roughness",
-        f"{summary}{at_100[_LIGHT]:g}",
-        "mdfconv mtl --compare",
+        f"at Ns = 100 the rules of {len(rules)} importers give roughness {min(at_100):g} to "
+        f"{max(at_100):g}; natural light asks for {answer:.3g}",
+        "mdfconv list --encodings",
     )
 
 
 def _columns(exponents: Array) -> dict[str, Array]:
     """Return Ns, the roughness by each rule and by ours, and the RMSE of each for the light."""
-    roughness = {rule: importer_roughness(rule, exponents) for rule in IMPORTER_RULES}
+    roughness = {rule: importer_roughness(rule, exponents) for rule in IMPORTERS}
     roughness |= {name: roughness_of(exponents, metric_named(name)) for name in _OURS}
     light = metric_named(_LIGHT)
     errors = {
-        f"RMSE {name}": error_of(exponents, roughness[name], light)
-        for name in (*IMPORTER_RULES, _LIGHT)
+        f"RMSE {name}": error_of(exponents, roughness[name], light) for name in (*IMPORTERS, _LIGHT)
     }
     return {"Ns": exponents} | roughness | errors
 
@@ -85,37 +88,59 @@ def _answer() -> dict[str, str]:
 
 
 def _failures(curves: dict[str, Array]) -> dict[str, str]:
-    """Return how far too rough the rules get, and from which Ns on they are too smooth or 0."""
-    ratios = [curves[rule] / curves[_LIGHT] for rule in IMPORTER_RULES]
-    numbers = {
-        "times": [f"{ratio.max():.1f}" for ratio in ratios],
-        "smooth": [f"{curves['Ns'][np.argmax(ratio < 1)]:.0f}" for ratio in ratios],
-        # 1 − 1000/1000 is rounded.
-        "mirror": [f"{curves['Ns'][np.argmax(ratio < 1e-9)]:.0f}" for ratio in ratios],
-    }
-    return {name: f"{', '.join(texts[:-1])} and {texts[-1]}" for name, texts in numbers.items()}
-
-
-def _shown(row: dict[str, float]) -> dict[str, Any]:
-    """Return a row for people: three digits, and a word for a perfect mirror's error."""
+    """Return how far off the rules are at Ns 100, and how many end at a mirror, for the prose."""
+    index = int(np.argmin(np.abs(curves["Ns"] - 100)))
+    ratios = np.array([curves[rule][index] / curves[_LIGHT][index] for rule in IMPORTERS])
+    mirrors = sum(bool((curves[rule] < 1e-9).any()) for rule in IMPORTERS)
     return {
-        name: float(f"{value:.3g}") if np.isfinite(value) else "mirror"
-        for name, value in row.items()
+        "rules": str(len(IMPORTERS)),
+        "right": str((np.abs(ratios - 1) < _ABOUT_RIGHT).sum() or "none"),
+        "about": f"{100 * _ABOUT_RIGHT:g} %",
+        "rougher": f"{ratios.max():.1f}",
+        "mirrors": str(mirrors),
     }
+
+
+def _tables() -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return the answer under the metrics, and each rule with what it leaves."""
+    shown = np.array([1.0, *EXPONENTS, 10000])
+    answers = {name: roughness_of(shown, metric_named(name)) for name in _OURS}
+    ours = [
+        {"Ns": f"{n:g}"} | {name: f"{answers[name][row]:.4g}" for name in _OURS}
+        for row, n in enumerate(shown)
+    ]
+    rules = []
+    for record in encoding_records(metric_named(_LIGHT)):
+        name = record["encoding"].partition(":")[2]
+        if name in IMPORTERS:
+            row = {"importer": name, "programs": record["programs"], "rule": record["formula"]}
+            for n in EXPONENTS:
+                row[f"r at {n}"] = float(f"{record[f'roughness_{n}']:.3g}")
+            for n in EXPONENTS:
+                rmse = record[f"rmse_{n}"]
+                row[f"RMSE at {n}"] = f"{rmse:.2g}" if np.isfinite(rmse) else "mirror"
+            rules.append(row)
+    return ours, rules
 
 
 def _draw(curves: dict[str, Array]) -> bytes:
-    figure = new_figure(PAGE[0] * 1.35, PAGE[1] * 0.85)
+    figure = new_figure(PAGE[0] * 1.35, PAGE[1] * 1.05)
     left, right = figure.subplots(1, 2)
-    for name, (color, dashes) in _STYLES.items():
-        label = name if name in IMPORTER_RULES else f"mdfconv, {name}"
-        style = {"color": color, "linestyle": dashes, "linewidth": 1.4}
+    colors = colormaps["tab10"](range(10)).tolist()
+    styles = {
+        name: (colors[number % len(colors)], _DASHES[number % len(_DASHES)])
+        for number, name in enumerate(IMPORTERS)
+    }
+    for name, (color, dashes) in (styles | _OUR_STYLES).items():
+        label = name if name in IMPORTERS else f"mdfconv, {name}"
+        width = 2.0 if name == _LIGHT else 1.1
+        style = {"color": color, "linestyle": dashes, "linewidth": width}
         left.plot(curves["Ns"], curves[name], label=label, **style)
         if f"RMSE {name}" in curves:
             errors = curves[f"RMSE {name}"]
             finite = np.isfinite(errors)
             right.plot(curves["Ns"][finite], errors[finite], **style)
-    left.set(xscale="log", xlabel="Ns", ylabel="roughness Pr", title="What becomes of an exponent")
+    left.set(xscale="log", xlabel="Ns", ylabel="roughness", title="What becomes of an exponent")
     right.set(
         xscale="log",
         yscale="log",
@@ -123,7 +148,7 @@ def _draw(curves: dict[str, Array]) -> bytes:
         ylabel="relative RMSE under environment",
         title="Error, up to where a rule makes a mirror",
     )
-    figure.legend(loc="outside lower center", ncols=5)
+    figure.legend(loc="outside lower center", ncols=6)
     return encoded(figure, dpi=110)
 
 
@@ -132,15 +157,24 @@ _PROSE = """\
 
 ![Roughness and error over Ns](importers.png)
 
-Importers in wide use map a Wavefront exponent to the roughness of GGX (α = Pr²) by 1 − Ns/1000,
-1 − √(Ns/1000) or 1 − √Ns/10, clipped to [0, 1]. `environment` is the roughness that keeps the light
-of a natural environment (`mdfconv mtl`), `energy` that of the sun or a lamp, `display` the picture
-on a screen. RMSE: relative, under the environment metric; `mirror` is a roughness of 0, which has
-no highlight to compare.
+{rules} importers and exporters in wide use map a Wavefront exponent to the roughness of GGX
+(α = r²) by as many rules, read in their sources. `environment` is the roughness that keeps the
+light of a natural environment (`mdfconv mtl`), `energy` that of the sun or a lamp, `display` the
+picture on a screen.
 
 The answer is a power: Pr ≈ {formula} is right within {formula_error} from Ns {range}
-(`mdfconv formula --from blinn-phong --to ggx:roughness`). The rules are too rough,
-by up to {times} times, then too smooth, from Ns = {smooth} on, and end at
-Ns = {mirror}, from where on they make a perfect mirror of everything. What remains of
-the error of `environment` is the difference between the two distributions, which no roughness
-mends."""
+(`mdfconv formula --from blinn-phong --to ggx:roughness`). At Ns = 100 {right} of the {rules} rules
+come within {about} of it, the farthest is {rougher} times as rough, and {mirrors} make a perfect
+mirror of everything from some exponent on. The commonest mistake is a missing square root: α stored
+as roughness. What remains of the error of `environment` is the difference between the two
+distributions, which no roughness mends.
+
+A file that one of these programs made is repaired by naming it:
+`mdfconv convert --from blinn-phong:obj2gltf --to ggx:roughness 0.9` is what an exponent of 100
+should have become."""
+
+_RULES = """\
+N: the exponent. r: the roughness stored. L: luminance of Ks or weight of the specular lobe, 1 in
+these numbers. s: smoothness, 1 − r. RMSE: relative, under the environment metric; `mirror` is a
+roughness of 0, which has no highlight to compare. The rule's exact inverse, where it has one, is
+the encoding `blinn-phong:` with the importer's name."""

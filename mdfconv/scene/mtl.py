@@ -9,6 +9,7 @@ import numpy as np
 
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
+from mdfconv.scene.material_files import FileConversion
 from mdfconv.scene.mtl_statements import Line, lines, number, split_options
 from mdfconv.scene.shininess import error_of, exponent_of, roughness_of
 
@@ -69,26 +70,20 @@ class TextureStatement:
     line: int
 
 
-@dataclass(frozen=True)
-class MtlConversion:
-    """A converted library.
+@dataclass(frozen=True, kw_only=True)
+class MtlConversion(FileConversion):
+    """A converted library, with the lines of its problems.
 
     Parameters
     ----------
-    data : bytes
-        Its bytes.
     materials : tuple of Material
         What was converted, in the order of the library.
     textures : tuple of TextureStatement
         The textures of exponents (or of roughness, towards shininess) that it names.
-    problems : tuple of (int, str)
-        Statements left as they are: their lines and what is wrong with them.
     """
 
-    data: bytes
     materials: tuple[Material, ...]
     textures: tuple[TextureStatement, ...]
-    problems: tuple[tuple[int, str], ...]
 
 
 @dataclass
@@ -147,7 +142,12 @@ def convert_mtl(
     textures = _textures(content, blocks, b"map_" + keywords[0])
     names = texture_names or {}
     _set_textures(texts, content, textures, b"map_" + keywords[1], names, replace=replace)
-    return MtlConversion(b"".join(texts), tuple(filter(None, materials)), textures, tuple(problems))
+    return MtlConversion(
+        data=b"".join(texts),
+        materials=tuple(filter(None, materials)),
+        textures=textures,
+        problems=tuple(problems),
+    )
 
 
 def texture_statements(data: bytes) -> tuple[TextureStatement, ...]:

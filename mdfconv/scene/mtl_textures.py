@@ -1,4 +1,4 @@
-"""Exponent textures of a material library: converted to roughness beside it."""
+"""Exponent textures of a material library: converted to roughness, to stand beside it."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from pathlib import Path
 
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
+from mdfconv.scene.material_files import read_file
 from mdfconv.scene.mtl import TextureStatement
 from mdfconv.scene.shininess import ROUGHNESS, SHININESS
-from mdfconv.scene.texture import convert_texture_file
+from mdfconv.scene.texture_bytes import convert_texture_bytes
 from mdfconv.scene.texture_rule import TextureRule
 
 
@@ -20,8 +21,8 @@ def convert_textures(
     metric: str | Metric,
     exponent_max: float,
     advance: Callable[[int], None],
-) -> tuple[dict[str, str], list[tuple[int, str]]]:
-    """Convert the textures that a library names, into the folder of its conversion.
+) -> tuple[dict[str, str], dict[Path, bytes], list[tuple[int, str]]]:
+    """Convert the textures that a library names, for the folder of its conversion.
 
     Parameters
     ----------
@@ -40,6 +41,8 @@ def convert_textures(
     -------
     names : dict
         From the files named to the new ones: ``wood.png`` becomes ``wood_Pr.png``.
+    files : dict
+        The new files.
     problems : list of (int, str)
         For each texture that cannot be converted its line and the reason.
     """
@@ -52,6 +55,7 @@ def convert_textures(
     rule.endpoints()
     names: dict[str, str] = {}
     done: dict[Path, str] = {}
+    files: dict[Path, bytes] = {}
     problems = []
     for texture in textures:
         # Libraries from Windows separate folders by backslashes.
@@ -61,10 +65,10 @@ def convert_textures(
             if source not in done:
                 if target.exists():
                     raise MdfconvError(f"will not write {target}: it exists")
-                convert_texture_file(source, target, rule)
+                files[target] = convert_texture_bytes(read_file(source), source.suffix, rule)
                 done[source] = target.name
             names[texture.file] = done[source]
         except MdfconvError as error:
             problems.append((texture.line, str(error)))
         advance(1)
-    return names, problems
+    return names, files, problems

@@ -13,6 +13,7 @@ import numpy as np
 from mdfconv.conversion import convert
 from mdfconv.conversion.endpoint import endpoints
 from mdfconv.conversion.remaining_error import remaining_error
+from mdfconv.distributions.dialects import DIALECTS
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
 
@@ -99,17 +100,22 @@ def error_of(exponent: Array, roughness: Array, metric: Metric) -> Array:
     return rmse
 
 
-# What importers in wide use make of Ns; beyond the ends of [0, 1] they clip.
-IMPORTER_RULES = {
-    "1 - Ns/1000": lambda exponent: 1 - exponent / 1000,
-    "1 - sqrt(Ns/1000)": lambda exponent: 1 - np.sqrt(exponent / 1000),
-    "1 - sqrt(Ns)/10": lambda exponent: 1 - np.sqrt(exponent) / 10,
-}
+# The programs that store a roughness for an exponent, and render it with GGX.
+IMPORTERS = {dialect.name: dialect for dialect in DIALECTS if dialect.roughness}
+# The specular weight for those whose rule depends on it.
+_FULL_WEIGHT = 1.0
 
 
-def importer_roughness(rule: str, exponent: Array) -> Array:
-    """Return the roughness that one of `IMPORTER_RULES` gives for an exponent."""
-    clipped: Array = np.clip(IMPORTER_RULES[rule](exponent), 0, 1)
+def importer_roughness(importer: str, exponent: Array) -> Array:
+    """Return the roughness that one of `IMPORTERS` makes of exponents, from 0 to 1.
+
+    A rule that depends on the specular weight is given 1.
+    """
+    dialect = IMPORTERS[importer]
+    assert dialect.roughness is not None
+    with np.errstate(divide="ignore"):
+        stored = dialect.encode(exponent, _FULL_WEIGHT)
+    clipped: Array = np.clip(dialect.roughness(stored), 0, 1)
     return clipped
 
 
@@ -119,25 +125,25 @@ class ImporterResult:
 
     Parameters
     ----------
-    rule : str
-        One of `IMPORTER_RULES`.
+    importer : str
+        One of `IMPORTERS`.
     roughness : float
-        Pr by that rule.
+        The roughness by its rule.
     rmse : float
         The error that it leaves, as `error_of`; infinite for a mirror.
     """
 
-    rule: str
+    importer: str
     roughness: float
     rmse: float
 
 
 def importer_results(exponent: Array, metric: Metric) -> list[tuple[ImporterResult, ...]]:
-    """Return what each of `IMPORTER_RULES` makes of each exponent, shape (n,)."""
+    """Return what each of `IMPORTERS` makes of each exponent, shape (n,)."""
     by_rule = []
-    for rule in IMPORTER_RULES:
-        roughness = importer_roughness(rule, exponent)
+    for importer in IMPORTERS:
+        roughness = importer_roughness(importer, exponent)
         rmse = error_of(exponent, roughness, metric)
         pairs = zip(roughness.tolist(), rmse.tolist(), strict=True)
-        by_rule.append([ImporterResult(rule, *pair) for pair in pairs])
+        by_rule.append([ImporterResult(importer, *pair) for pair in pairs])
     return list(zip(*by_rule, strict=True))

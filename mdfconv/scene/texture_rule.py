@@ -8,6 +8,7 @@ import numpy as np
 
 from mdfconv.conversion.endpoint import Endpoint, endpoint, endpoints
 from mdfconv.distributions import distribution
+from mdfconv.distributions.dialects import dialects_of
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import Encoding, Parameter
 from mdfconv.errors import MdfconvError
@@ -88,9 +89,12 @@ class TextureRule:
             choices = " or ".join(f"{owner.name}:{encoding}" for encoding in known)
             raise MdfconvError(f"a texture of {owner.name} needs an encoding", choices)
         key = tail.strip().lower()
-        if key not in known:
-            raise unknown_name(f"encoding of {owner.name} in a texture", tail, list(known))
-        return Endpoint(owner, known[key])
+        if key in known:
+            return Endpoint(owner, known[key])
+        dialects = list(dialects_of(owner.name))
+        if key.partition(":")[0] in dialects:
+            return endpoint(name)
+        raise unknown_name(f"encoding of {owner.name} in a texture", tail, [*known, *dialects])
 
     def _encodings(self, parameter: Parameter) -> tuple[Encoding, Encoding]:
         """Return how a texture stores a parameter that scenes use beyond 1."""

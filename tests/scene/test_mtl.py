@@ -15,7 +15,7 @@ import mdfconv
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.scene import convert_mtl
 from mdfconv.scene.shininess import (
-    IMPORTER_RULES,
+    IMPORTERS,
     error_of,
     exponent_of,
     importer_results,
@@ -216,10 +216,11 @@ def test_command(tmp_path):
     )
     (record,) = json.loads(out)
     assert [row["shininess"] for row in record["materials"]] == [96.078431, 20.0]
-    rules = record["materials"][0]["1 - Ns/1000"]
+    rules = record["materials"][0]["importers"]["obj2gltf"]
     assert rules["roughness"] == pytest.approx(0.903921569)
     assert rules["rmse"] > 5 * record["materials"][0]["rmse"]
-    assert record["materials"][0]["1 - sqrt(Ns)/10"]["roughness"] == pytest.approx(0.0198, abs=1e-4)
+    fbx = record["materials"][0]["importers"]["fbx"]
+    assert fbx["roughness"] == pytest.approx(0.0198, abs=1e-4)
 
 
 def test_in_place_keeps_the_original(tmp_path):
@@ -253,7 +254,7 @@ def test_a_bad_statement_turns_the_status_to_1(tmp_path):
         (["a.mtl", "-o", "x.mtl", "--in-place"], "in place, or into another file or folder"),
         (["a.mtl", "-o", "a.mtl"], "it is the input"),
         (["a.mtl", "-o", "b.mtl"], "will not write b.mtl: it exists"),
-        (["a.mtl", "b.mtl", "-o", "x.mtl"], "2 libraries need a folder"),
+        (["a.mtl", "b.mtl", "-o", "x.mtl"], "2 files need a folder"),
         (["a.mtl", "sub/a.mtl", "-o", "new"], "would both be written to new/a.mtl"),
         (["none.mtl", "-o", "x.mtl"], "cannot read none.mtl"),
         (["*.none", "-o", "x.mtl"], "cannot read *.none"),
@@ -296,7 +297,7 @@ def test_the_table_is_whole_on_a_narrow_terminal(tmp_path):
     words = "mtl", tmp_path / "in.mtl", "-o", tmp_path / "out.mtl", "--compare"
     status, out = run_on_terminal(*words, COLUMNS="60")
     assert status == 0
-    for cell in ("chrome", "500.5", "0.222087", "1 - Ns/1000", "0.293 ("):
+    for cell in ("chrome", "500.5", "0.222087", "blender-obj", "0.293"):
         assert cell in out
 
 
@@ -323,8 +324,10 @@ def test_the_inverse_answers_beyond_what_libraries_hold():
 def test_importers_are_compared_as_data():
     exponents, metric = np.array([1.0, 100.0, 2000.0]), metric_named("energy")
     results = importer_results(exponents, metric)
-    assert [[result.rule for result in row] for row in results] == [list(IMPORTER_RULES)] * 3
-    assert [result.roughness for result in results[1]] == pytest.approx([0.9, 1 - 0.1**0.5, 0])
+    assert [[result.importer for result in row] for row in results] == [list(IMPORTERS)] * 3
+    by_name = {result.importer: result.roughness for result in results[1]}
+    wanted = {"obj2gltf": 0.9, "blender-obj": 1 - 0.1**0.5, "fbx": 0, "unity-fbx": 0}
+    assert {name: by_name[name] for name in wanted} == pytest.approx(wanted)
     for row, exponent in zip(results, exponents, strict=True):
         for result in row:
             alone = error_of(np.array([exponent]), np.array([result.roughness]), metric)

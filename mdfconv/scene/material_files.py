@@ -1,21 +1,20 @@
-"""Material libraries as files: where the results go, and that nothing is lost on the way."""
+"""Files of materials: where their conversions go, and that nothing is lost on the way."""
 
 from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mdfconv.errors import MdfconvError
 from mdfconv.output.files import write_files
-from mdfconv.scene.mtl import MtlConversion
 
 
 @dataclass(frozen=True)
 class Destination:
-    """A library and where its conversion goes.
+    """A file and where its conversion goes.
 
     Parameters
     ----------
@@ -30,7 +29,7 @@ class Destination:
     backup: Path | None = None
 
 
-def find_libraries(patterns: Sequence[str]) -> list[Path]:
+def find_files(patterns: Sequence[str]) -> list[Path]:
     """Return the files that names and glob patterns stand for, each once.
 
     Raises
@@ -38,58 +37,58 @@ def find_libraries(patterns: Sequence[str]) -> list[Path]:
     MdfconvError
         If one stands for nothing.
     """
-    libraries: dict[Path, None] = {}
+    files: dict[Path, None] = {}
     for pattern in patterns:
         names = [pattern] if Path(pattern).exists() else sorted(glob.glob(pattern, recursive=True))
         if not names:
             raise MdfconvError(f"cannot read {pattern}: No such file or directory")
-        libraries |= dict.fromkeys(map(Path, names))
-    return list(libraries)
+        files |= dict.fromkeys(map(Path, names))
+    return list(files)
 
 
 def choose_outputs(
-    libraries: Sequence[Path], output: str | None, *, in_place: bool
+    files: Sequence[Path], output: str | None, *, in_place: bool
 ) -> list[Destination]:
-    """Return where each library's conversion goes.
+    """Return where each file's conversion goes.
 
     Parameters
     ----------
-    libraries : sequence of Path
-        The libraries.
+    files : sequence of Path
+        The files.
     output : str or None
         A file for one of them, or a folder, which exists.
     in_place : bool
-        Write over the library itself and keep the original beside it.
+        Write over the file itself and keep the original beside it.
 
     Raises
     ------
     MdfconvError
-        If the results are to go nowhere or to two places, several libraries to one file, or one
-        over a file that would be lost.
+        If the results are to go nowhere or to two places, several to one file, or one over a
+        file that would be lost.
     """
     if in_place == (output is not None):
         raise MdfconvError(
-            "a library is converted in place, or into another file or folder",
+            "a file is converted in place, or into another file or folder",
             "choose one of them",
             argument="in_place",
         )
     if output is None:
-        real = dict.fromkeys(library.resolve() for library in libraries)
-        return [Destination(library, library, _free_backup(library)) for library in real]
+        real = dict.fromkeys(file.resolve() for file in files)
+        return [Destination(file, file, _free_backup(file)) for file in real]
     path = Path(output)
     if path.is_dir():
-        destinations = [Destination(library, path / library.name) for library in libraries]
-    elif len(libraries) > 1:
-        raise MdfconvError(f"{len(libraries)} libraries need a folder: {output} is not one")
+        destinations = [Destination(file, path / file.name) for file in files]
+    elif len(files) > 1:
+        raise MdfconvError(f"{len(files)} files need a folder: {output} is not one")
     elif output.endswith(("/", os.sep)) or output == "-":
         raise MdfconvError(f"cannot write {output}: it is not a file or an existing folder")
     else:
-        destinations = [Destination(libraries[0], path)]
+        destinations = [Destination(files[0], path)]
     outputs = [destination.output for destination in destinations]
     for destination in destinations:
         _check_new(destination)
         if outputs.count(destination.output) > 1:
-            raise MdfconvError(f"two libraries would both be written to {destination.output}")
+            raise MdfconvError(f"two files would both be written to {destination.output}")
     return destinations
 
 
@@ -105,17 +104,37 @@ def _check_new(destination: Destination) -> None:
     raise MdfconvError(f"will not write {output}: it exists")
 
 
-def _free_backup(library: Path) -> Path:
+def _free_backup(file: Path) -> Path:
     """Return a name for the backup that no file has."""
-    backup, count = library.with_name(f"{library.name}.bak"), 1
+    backup, count = file.with_name(f"{file.name}.bak"), 1
     while backup.exists():
         count += 1
-        backup = library.with_name(f"{library.name}.bak{count}")
+        backup = file.with_name(f"{file.name}.bak{count}")
     return backup
 
 
-def read_library(path: Path) -> bytes:
-    """Return the bytes of a library.
+@dataclass(frozen=True, kw_only=True)
+class FileConversion:
+    """A converted file of materials.
+
+    Parameters
+    ----------
+    data : bytes
+        Its bytes.
+    problems : tuple of (int or str, str)
+        What is left as it is: where it stands, a line or a path within the file, and what is
+        wrong with it.
+    files : mapping of Path to bytes
+        What goes beside the result, such as textures.
+    """
+
+    data: bytes
+    problems: tuple[tuple[int | str, str], ...] = ()
+    files: Mapping[Path, bytes] = field(default_factory=dict)
+
+
+def read_file(path: Path) -> bytes:
+    """Return the bytes of a file.
 
     Raises
     ------
@@ -128,17 +147,17 @@ def read_library(path: Path) -> bytes:
         raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
 
 
-def write_libraries(
-    converted: Sequence[tuple[Destination, bytes, MtlConversion]],
+def write_conversions(
+    converted: Sequence[tuple[Destination, bytes, FileConversion]],
 ) -> list[Destination]:
-    """Write all conversions, and backups first, or nothing.
+    """Write all conversions and what goes beside them, backups first, or nothing.
 
     What a conversion in place does not change is not written.
 
     Parameters
     ----------
-    converted : sequence of (Destination, bytes, MtlConversion)
-        For each library where it goes, its original and its conversion.
+    converted : sequence of (Destination, bytes, FileConversion)
+        For each file where it goes, its original and its conversion.
 
     Returns
     -------
@@ -148,20 +167,24 @@ def write_libraries(
     Raises
     ------
     MdfconvError
-        If a file cannot be written; nothing is then changed.
+        If a file cannot be written, or two differ and have one name; nothing is then changed.
     """
     changed = [
-        (destination, original, conversion.data)
+        (destination, original, conversion)
         for destination, original, conversion in converted
         if not (destination.backup and conversion.data == original)
     ]
+    backups: dict[Path, bytes] = {}
     contents: dict[Path, bytes] = {}
     modes = {}
-    for destination, original, _ in changed:
+    for destination, original, conversion in changed:
         if destination.backup:
-            contents[destination.backup] = original
+            backups[destination.backup] = original
             modes[destination.output] = destination.output.stat().st_mode
-    write_files(contents | {destination.output: data for destination, _, data in changed})
+        for path, data in {destination.output: conversion.data, **conversion.files}.items():
+            if contents.setdefault(path, data) != data:
+                raise MdfconvError(f"two results would both be written to {path}")
+    write_files(backups | contents)
     for path, mode in modes.items():
         path.chmod(mode)
     return [destination for destination, *_ in changed]

@@ -1,0 +1,161 @@
+"""What programs store, against their own rules: written here as their sources have them."""
+
+import math
+
+import numpy as np
+import pytest
+
+import mdfconv
+from mdfconv.conversion.endpoint import encodings_of, endpoint
+from mdfconv.distributions.dialects import DIALECTS, Specular
+from mdfconv.errors import MdfconvError
+
+EXPONENTS = np.geomspace(0.3, 3e4, 20).tolist()
+ALPHAS = np.geomspace(2e-3, 1.0, 20).tolist()
+WEIGHTS = {Specular.no: (1.0,), Specular.optional: (1.0, 0.2, 0.04), Specular.needed: (1.0, 0.3)}
+
+
+def clamp(value, low=0.0, high=1.0):
+    return max(low, min(high, value))
+
+
+def babylon(n):
+    """A cubic Bézier curve through (0, 1), (0, 0.1), (0, 0.1), (1300, 0.1)."""
+    t = clamp(n, 0, 1300) ** (1 / 3) / 1300 ** (1 / 3)
+    points = (1, 0.1, 0.1, 0.1)
+    return sum(math.comb(3, k) * (1 - t) ** (3 - k) * t**k * points[k] for k in range(4))
+
+
+def obj2gltf(n, weight):
+    roughness = clamp(1.0 - n / 1000.0)
+    return roughness * (1.0 - weight) if weight < 0.1 else roughness
+
+
+def adobe(n, weight):
+    roughness = math.sqrt(2 / (n * weight + 2))
+    return 0.0 if roughness < 0.08 else roughness
+
+
+# From exponent and specular weight to what is stored.
+STORED = {
+    "blender-obj": lambda n, weight: 1 - math.sqrt(clamp(n, 0, 1000) / 1000),
+    "obj2gltf": obj2gltf,
+    "assimp-gltf": lambda n, weight: max(0, 1 - weight * math.sqrt(n / 1000)),
+    "fbx": lambda n, weight: max(0, 1 - math.sqrt(n) / 10),
+    "unity-fbx": lambda n, weight: clamp(math.sqrt(n / 100)),
+    "peak-alpha": lambda n, weight: math.sqrt(2 / (n + 2)),
+    "peak": lambda n, weight: (2 / (n + 2)) ** 0.25,
+    "babylon": lambda n, weight: babylon(n),
+    "vtk-gltf": lambda n, weight: 1 / (1 + 0.2 * weight * n),
+    "ifcopenshell-gltf": lambda n, weight: 1 / n,
+    "mmd-tools": lambda n, weight: 1 / max(n, 1) ** 0.37,
+    "adobe-usd": adobe,
+    "adobe-fbx": lambda n, weight: max(0, 1 - n / 100),
+    "mitsuba-phong": lambda n, weight: math.sqrt(2 / (n + 2)),
+    "cycles-ashikhmin": lambda n, weight: math.sqrt(math.sqrt(2 / (n + 2))),
+    "x3d": lambda n, weight: n / 128,
+}
+
+
+def pbrt_alpha(roughness):
+    x = math.log(max(roughness, 1e-3))
+    return (
+        1.62142 + 0.819955 * x + 0.1734 * x * x + 0.0171201 * x * x * x
+        + 0.000640711 * x * x * x * x
+    )  # fmt: skip
+
+
+# From what is stored to α.
+READ = {
+    "pbrt-v3": pbrt_alpha,
+    "pbrt-v4": math.sqrt,
+    "blender-2.7": lambda r: r,
+    "gltf-glossiness": lambda g: (1 - g) ** 2,
+    "luxcore-glossy2": lambda u: math.sqrt(u * u),
+}
+CASES = [(owner, dialect) for dialect in DIALECTS for owner in dialect.owners]
+IDS = [f"{owner}:{dialect.name}" for owner, dialect in CASES]
+
+
+def test_every_dialect_has_a_rule_of_its_source():
+    assert {dialect.name for dialect in DIALECTS} == set(STORED) | set(READ)
+    assert not set(STORED) & set(READ)
+    for dialect in DIALECTS:
+        assert dialect.program
+        assert dialect.source
+        assert dialect.formula
+
+
+@pytest.mark.parametrize(("owner", "dialect"), CASES, ids=IDS)
+def test_twenty_values_as_the_program_and_back(owner, dialect):
+    for weight in WEIGHTS[dialect.specular]:
+        setting = "" if dialect.specular is Specular.no else f":{weight}"
+        end = endpoint(f"{owner}:{dialect.name}{setting}")
+        inside = 0
+        if dialect.name in STORED:
+            for n in EXPONENTS:
+                wanted = STORED[dialect.name](n, weight)
+                stored = end.encode(np.array([n]))
+                if np.isnan(stored[0]):
+                    assert not end.stored.accepts(np.array(wanted))
+                    continue
+                assert stored[0] == pytest.approx(wanted, rel=1e-12, abs=1e-15)
+                if not end.encoding.clamped(stored)[0]:
+                    # Where a rule is 1 − …, the last digit of the stored number is worth more.
+                    worth = 4e-16 / (1 - wanted) if wanted < 1 else 1e-9
+                    assert end.decode(stored)[0] == pytest.approx(n, rel=max(1e-12, worth))
+                    inside += 1
+        else:
+            stored = np.linspace(*end.stored.typical, 20)
+            stored = stored[end.stored.accepts(stored)]
+            wanted = [READ[dialect.name](value) for value in stored]
+            np.testing.assert_allclose(end.decode_legal(stored), wanted, rtol=1e-12)
+            np.testing.assert_allclose(end.encode(np.array(wanted)), stored, rtol=1e-12)
+            inside = stored.size
+        assert inside >= 7
+
+
+def test_examples_of_the_sources():
+    assert mdfconv.convert(64.0, "blinn-phong", "blinn-phong:babylon") == pytest.approx(
+        0.328809, abs=5e-7
+    )
+    # An OBJ's 100, by way of obj2gltf, is what 100 itself should have become.
+    repaired = mdfconv.convert(0.9, "blinn-phong:obj2gltf", "ggx:roughness", metric="environment")
+    assert repaired == pytest.approx(0.331488, abs=1e-6)
+    assert mdfconv.convert(1.0, "ggx:blender-2.7", "ggx") == 1
+
+
+def test_what_is_clamped_has_no_inverse():
+    with pytest.raises(MdfconvError, match=r"no inverse here: r = 0 is any N ≥ 1000"):
+        mdfconv.convert([0.5, 0.0], "blinn-phong:obj2gltf", "ggx")
+    with pytest.raises(MdfconvError, match=r"r = 0 is any N ≥ 621"):
+        mdfconv.convert(0, "blinn-phong:adobe-usd:0.5", "ggx")
+    with pytest.raises(MdfconvError, match=r"r = 1 is any N ≤ 1"):
+        mdfconv.convert(1.0, "blinn-phong:mmd-tools", "ggx")
+    # The other way it is what the program stores, and a caution says what is lost.
+    (found,) = mdfconv.explain([5000.0], "blinn-phong", "blinn-phong:fbx")
+    assert found.result == 0
+    assert "r = 0 is any N ≥ 100" in found.cautions[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("blinn-phong:vtk-gltf", "depends on the specular weight"),
+        ("blinn-phong:vtk-gltf:0", "above 0 and at most 1, not 0"),
+        ("blinn-phong:vtk-gltf:much", "a specular weight is a number, not 'much'"),
+        ("blinn-phong:fbx:0.5", "fbx does not depend on a specular weight"),
+        ("ggx:roughness:0.5", "ggx:roughness takes no '0.5'"),
+        ("ggx:pbrt", "did you mean pbrt-v"),
+        ("sawicki:fbx", "sawicki has no encoding 'fbx'"),
+    ],
+)
+def test_mistakes(name, message):
+    with pytest.raises(MdfconvError, match=message):
+        endpoint(name)
+
+
+@pytest.mark.parametrize("name", [f"{owner}:{dialect.name}" for owner, dialect in CASES])
+def test_names_are_listed(name):
+    owner, _, encoding = name.partition(":")
+    assert encoding in encodings_of(mdfconv.distribution(owner))

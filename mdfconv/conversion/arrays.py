@@ -92,12 +92,14 @@ def convert(
             return tuple(_like(array, operand) for array in results[:2])
         return _convert(operand, rule, kept, *ends, threads)
     check_pair(values, *ends)
-    x, y = (as_operand(axis) for axis in values)
+    x, y = (as_operand(axis) for axis in ends[0].axes(values))
     try:
         np.broadcast_shapes(np.shape(x), np.shape(y))
     except ValueError:
         raise MdfconvError(f"shapes {np.shape(x)} and {np.shape(y)} are not a pair") from None
-    return _convert(x, rule, kept, *ends, threads), _convert(y, rule, kept, *ends, threads)
+    return ends[1].pair(
+        _convert(x, rule, kept, *ends, threads), _convert(y, rule, kept, *ends, threads)
+    )
 
 
 def given_gamma(gamma: Gamma) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -85,6 +86,42 @@ class Endpoint:
             return {}
         symbols = self.stored.symbol, self.distribution.parameter.symbol
         return {clamp.text(*symbols): stored == clamp.stored for clamp in self.encoding.clamps}
+
+    def axes(self, pair: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Return what is stored for each axis by itself, for the pair that the user gives.
+
+        Raises
+        ------
+        MdfconvError
+            If the second number is illegal.
+        """
+        if not self.encoding or not self.encoding.pairing:
+            return pair
+        pairing = self.encoding.pairing
+        first = np.asarray(self.stored.check(pair[0], self.label), dtype=np.float64)
+        second = np.asarray(pairing.second.check(pair[1], self.label), dtype=np.float64)
+        x, y = pairing.axes(first, second)
+        return x[()], y[()]
+
+    def pair(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """Return the pair to give to the user, for what is stored for each axis by itself.
+
+        Raises
+        ------
+        MdfconvError
+            If there is no such pair.
+        """
+        if not self.encoding or not self.encoding.pairing:
+            return x, y
+        pairing = self.encoding.pairing
+        with np.errstate(all="ignore"):
+            first, second = pairing.pair(np.asarray(x, float), np.asarray(y, float))
+        if not np.all(self.stored.accepts(first) & pairing.second.accepts(second)):
+            raise MdfconvError(
+                f"{self.label} has no such pair: its {pairing.second.name} is "
+                f"{pairing.second.legal}, and x is the rougher axis"
+            )
+        return first[()], second[()]
 
     def _check_clamps(self, values: ArrayLike) -> None:
         stored = np.asarray(values)

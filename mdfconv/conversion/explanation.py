@@ -114,7 +114,8 @@ def explain(
     kept = given_metric(metric)
     rule = chosen_method(method, *ends, gamma, metric_given=metric is not None)
     axes = _axes(values, *ends)
-    parameter = ends[0].decode([value for pair in axes for value in pair])
+    stored = [pair if len(pair) == 1 else ends[0].axes(pair) for pair in axes]
+    parameter = ends[0].decode([value for pair in stored for value in pair])
     table = _Table(rule, kept, parameter, *ends, free=isinstance(gamma, str), errors=errors)
     return [table.conversion(pair, rows) for pair, rows in _with_rows(axes)]
 
@@ -245,7 +246,7 @@ class _Table:
             source=self._source.label,
             target=self._target.label,
             value=_value([float(value) for value in pair]),
-            result=_value(self._stored[rows].tolist()),
+            result=_value(self._given(self._stored[rows])),
             gamma=None if self._gamma is None else float(self._gamma[rows][0]),
             method=self._answered_by[rows][0],
             metric=str(self._metric),
@@ -256,6 +257,12 @@ class _Table:
             max_error=max_error,
             cautions=self._true_of(rows),
         )
+
+    def _given(self, stored: Array) -> list[float]:
+        """Return stored results as the user is to have them."""
+        if stored.size == 1:
+            return [float(stored[0])]
+        return [float(value) for value in self._target.pair(*stored)]
 
     def _all_cautions(self) -> dict[str, Mask]:
         """Return sentences, and which of the numbers they are true of."""

@@ -14,7 +14,7 @@ from enum import StrEnum
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
-from mdfconv.distributions.parameter import Clamp, Encoding, Parameter
+from mdfconv.distributions.parameter import ROUGHNESS, Clamp, Encoding, Pairing, Parameter
 from mdfconv.errors import MdfconvError
 
 # From stored number or parameter, and the specular weight, to the other.
@@ -68,6 +68,8 @@ class Dialect:
         program renders the distribution itself, so that the rule makes no error.
     note : str
         What else to know.
+    pairing : Pairing or None
+        How it stores both axes of an anisotropic surface; None for each by itself.
     """
 
     name: str
@@ -82,6 +84,7 @@ class Dialect:
     specular: Specular = Specular.no
     roughness: Callable[[Array], Array] | None = field(default=None, compare=False)
     note: str = ""
+    pairing: Pairing | None = None
 
     def encoding(self, parameter: Parameter, setting: str = "") -> Encoding:
         """Return it as an encoding of a parameter.
@@ -127,6 +130,7 @@ class Dialect:
             encode,
             self.formula,
             clamps,
+            self.pairing,
         )
 
     def _weight(self, setting: str) -> float:
@@ -193,10 +197,65 @@ _MMD_POWER = 0.37
 _ADOBE_LEAST = 0.08
 
 
+_ANISOTROPY = Parameter("anisotropy", "a", (0.0, 0.9), 0, 1, lower_closed=True)
+# MaterialX reads any larger anisotropy as this.
+_MATERIALX_MOST = 0.98
+
+
+def _openpbr_axes(r: Array, a: Array) -> tuple[Array, Array]:
+    x = r * (2 / (1 + np.square(1 - a))) ** 0.25
+    return x, x * np.sqrt(1 - a)
+
+
+def _materialx_axes(r: Array, a: Array) -> tuple[Array, Array]:
+    aspect = np.sqrt(1 - a)
+    return np.sqrt(np.minimum(r * r / aspect, 1)), r * np.sqrt(aspect)
+
+
+def _stretch(x: Array, y: Array) -> Array:
+    """Return 1 − α_y/α_x, for roughness along the axes."""
+    return (x - y) * (x + y) / np.square(x)
+
+
+def _gltf_axes(r: Array, a: Array) -> tuple[Array, Array]:
+    return np.sqrt(r * r + (1 - r) * (1 + r) * a * a), r * np.ones_like(a)
+
+
+def _gltf_pair(x: Array, y: Array) -> tuple[Array, Array]:
+    # At α 1 across there is nothing to stretch to.
+    room = np.where(y < 1, (1 - y) * (1 + y), 1)
+    return y, np.sqrt((x - y) * (x + y) / room)
+
+
+_OPENPBR = Pairing(
+    _ANISOTROPY,
+    _openpbr_axes,
+    lambda x, y: (np.sqrt(np.hypot(x * x, y * y) / np.sqrt(2)), _stretch(x, y)),
+    "α_x = r² √(2/(1 + (1−a)²)), α_y = (1−a) α_x",
+)
+_MATERIALX = Pairing(
+    replace(_ANISOTROPY, upper=_MATERIALX_MOST, upper_closed=True),
+    _materialx_axes,
+    lambda x, y: (np.sqrt(x * y), _stretch(x, y)),
+    "α_x = r²/s, α_y = r² s, s = √(1−a)",
+)
+_GLTF_ANISOTROPY = Pairing(
+    replace(_ANISOTROPY, upper_closed=True),
+    _gltf_axes,
+    _gltf_pair,
+    "α_y = r², α_x = α_y + (1−α_y) a²",
+)
+
+
 def _same(stored: Array) -> Array:
     return stored
 
 
+# α = r², of each axis.
+_SQUARE: tuple[_Rule, _Rule] = (
+    lambda r, weight: ROUGHNESS.decode(r),
+    lambda alpha, weight: ROUGHNESS.encode(alpha),
+)
 _PHONG = ("blinn-phong",)
 _GGX, _SLOPES = ("ggx",), ("ggx", "beckmann")
 _TO_MIRROR = (Clamp(0.0, 0.0),)
@@ -339,6 +398,21 @@ DIALECTS = (
         lambda u, weight: u, lambda alpha, weight: alpha,
         "LuxCore glossy2", "material.cpp; glossy2.cpp", replace(_ABOVE_ZERO, symbol="u"),
         note="its own Schlick lobe is GGX and not schlick",
+    ),
+    Dialect(
+        "openpbr", _GGX, _OPENPBR.formula, *_SQUARE,
+        "OpenPBR", "specification 1.1, specular_roughness_anisotropy", _ABOVE_ZERO,
+        pairing=_OPENPBR,
+    ),
+    Dialect(
+        "materialx", _SLOPES, _MATERIALX.formula, *_SQUARE,
+        "MaterialX, roughness_anisotropy", "mx_roughness_anisotropy.glsl", _ABOVE_ZERO,
+        pairing=_MATERIALX, note="α_x is at most 1; an a beyond 0.98 is read as 0.98",
+    ),
+    Dialect(
+        "gltf-anisotropy", _GGX, _GLTF_ANISOTROPY.formula, *_SQUARE,
+        "glTF, KHR_materials_anisotropy", "text of the extension", _ABOVE_ZERO,
+        pairing=_GLTF_ANISOTROPY,
     ),
 )  # fmt: skip
 

@@ -139,6 +139,28 @@ class Clamp:
 
 
 @dataclass(frozen=True)
+class Pairing:
+    """How an encoding stores both axes of an anisotropic surface: one, and how they differ.
+
+    Parameters
+    ----------
+    second : Parameter
+        What is stored beside the first number, such as an anisotropy.
+    axes : callable
+        From both numbers to what the encoding stores for each axis by itself, along x and y.
+    pair : callable
+        Back; NaN where there is no such pair.
+    formula : str
+        The relation in words.
+    """
+
+    second: Parameter
+    axes: Callable[[Array, Array], tuple[Array, Array]]
+    pair: Callable[[Array, Array], tuple[Array, Array]]
+    formula: str
+
+
+@dataclass(frozen=True)
 class Encoding:
     """The form in which artists or files store a distribution's parameter.
 
@@ -154,6 +176,8 @@ class Encoding:
         The relation in words.
     clamps : tuple of Clamp
         Stored numbers that have no inverse.
+    pairing : Pairing, optional
+        How it stores a pair; None for each axis by itself.
     """
 
     name: str
@@ -162,6 +186,7 @@ class Encoding:
     encode: Callable[[Array], Array]
     formula: str
     clamps: tuple[Clamp, ...] = ()
+    pairing: Pairing | None = None
 
     def clamped(self, values: Array) -> Mask:
         """Return where stored numbers have no inverse, for they stand for many parameters."""

@@ -72,7 +72,30 @@ READ = {
     "blender-2.7": lambda r: r,
     "gltf-glossiness": lambda g: (1 - g) ** 2,
     "luxcore-glossy2": lambda u: math.sqrt(u * u),
+    # One number is an isotropic surface.
+    "openpbr": lambda r: r * r,
+    "materialx": lambda r: r * r,
+    "gltf-anisotropy": lambda r: r * r,
 }
+
+
+def openpbr(r, a):
+    along = r * r * math.sqrt(2 / (1 + (1 - a) * (1 - a)))
+    return along, (1 - a) * along
+
+
+def materialx(r, a):
+    aspect = math.sqrt(1 - clamp(a, 0, 0.98))
+    return min(r * r / aspect, 1), r * r * aspect
+
+
+def gltf(r, a):
+    alpha = r * r
+    return alpha * (1 - a * a) + a * a, alpha
+
+
+# From roughness and anisotropy to α along and across.
+PAIRS = {"openpbr": openpbr, "materialx": materialx, "gltf-anisotropy": gltf}
 CASES = [(owner, dialect) for dialect in DIALECTS for owner in dialect.owners]
 IDS = [f"{owner}:{dialect.name}" for owner, dialect in CASES]
 
@@ -159,3 +182,43 @@ def test_mistakes(name, message):
 def test_names_are_listed(name):
     owner, _, encoding = name.partition(":")
     assert encoding in encodings_of(mdfconv.distribution(owner))
+
+
+@pytest.mark.parametrize("name", list(PAIRS))
+@pytest.mark.parametrize("r", [0.05, 0.3, 0.7])
+@pytest.mark.parametrize("a", [0.0, 0.2, 0.6, 0.9])
+def test_pairs_of_roughness_and_anisotropy(name, r, a):
+    wanted = PAIRS[name](r, a)
+    along, across = mdfconv.convert((r, a), f"ggx:{name}", "ggx")
+    assert (along, across) == pytest.approx(wanted, rel=1e-13)
+    if along < 1:
+        back = mdfconv.convert((along, across), "ggx", f"ggx:{name}")
+        assert back == pytest.approx((r, a), rel=1e-12, abs=1e-7)
+    (found,) = mdfconv.explain([(r, a)], f"ggx:{name}", "beckmann", "peak")
+    assert found.value == (r, a)
+    assert found.result == pytest.approx(wanted, rel=1e-13)
+
+
+def test_pairs_of_arrays():
+    r, a = np.array([0.2, 0.5]), np.array([0.1, 0.8])
+    along, across = mdfconv.convert((r, a), "ggx:openpbr", "beckmann", metric="environment")
+    factor = mdfconv.convert(1.0, "ggx", "beckmann", metric="environment")
+    for index in range(2):
+        wanted = openpbr(r[index], a[index])
+        assert along[index] == pytest.approx(wanted[0] * factor, rel=1e-9)
+        assert across[index] == pytest.approx(wanted[1] * factor, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("pair", "ends", "message"),
+    [
+        ((0.1, 0.4), ("ggx", "ggx:openpbr"), "x is the rougher axis"),
+        ((0.9, 0.001), ("ggx", "ggx:materialx"), "no such pair"),
+        ((0.5, 1.0), ("ggx:openpbr", "ggx"), r"a = 1 is outside"),
+        ((0.5, -0.1), ("ggx:materialx", "ggx"), r"a = -0.1 is outside"),
+        ((0.0, 0.1), ("ggx:gltf-anisotropy", "ggx"), r"r = 0 is outside"),
+    ],
+)
+def test_pairs_that_are_none(pair, ends, message):
+    with pytest.raises(MdfconvError, match=message):
+        mdfconv.convert(pair, *ends)

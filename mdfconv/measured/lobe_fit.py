@@ -1,8 +1,7 @@
 """Fits of offset + scale · D̄(β; p) to samples, offset and scale eliminated.
 
 For given p the model is linear in the offset and scale of every channel, so they are solved
-for and only p is searched (variable projection: Golub & Pereyra 1973, with the derivative of
-Kaufman 1975). Under the logarithmic loss the same linear step is iterated.
+for and only p is searched (`mdfconv.measured.projection`).
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from scipy.optimize import least_squares
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
+from mdfconv.measured.projection import Projection, log_rmse, model, standard_deviations
 from mdfconv.measured.samples import Samples
 
 LOSSES = ("linear", "log")
@@ -28,11 +28,6 @@ _GAMMAS = 9
 _STEP = float(np.finfo(float).eps) ** (1 / 3)
 # Nearer than this to an end of its range, relatively, γ is at the end.
 _AT_END = 1e-3
-# Gauss-Newton steps for the logarithms: at the right parameter six are exact under 50 % of noise.
-_LOG_STEPS = 12
-# Of the smallest sample, under the logarithmic loss: a model is kept positive, far from where a
-# fit ends.
-_SMALLEST_MODEL = 1e-3
 # Values that a scan holds at a time: 16 MB.
 _SCANNED_AT_ONCE = 2_000_000
 # Inside the bounds by this, in a logarithm: the solver starts between them.
@@ -157,6 +152,7 @@ class _Problem:
         # In units of the largest value, whatever the measurement's.
         self._unit = float(np.max(np.abs(self._values)))
         self._values = self._values / self._unit
+        self._projection = Projection(self._values, log=self._log)
         self._candidates = self._scanned()
         logarithms = np.concatenate([points[:, 0] for points in self._candidates])
         # Beyond the candidates a lobe is narrower than the angles resolve, or nearly uniform.
@@ -198,7 +194,10 @@ class _Problem:
         block = max(1, _SCANNED_AT_ONCE // self._values.size)
         blocks = [points[start : start + block] for start in range(0, len(points), block)]
         return np.concatenate(
-            [np.sum(np.square(self._project(self._lobes(some))[0]), axis=(1, 2)) for some in blocks]
+            [
+                np.sum(np.square(self._projection(self._lobes(some))[0]), axis=(1, 2))
+                for some in blocks
+            ]
         )
 
     def refine(self, start: Array) -> tuple[float, Array]:
@@ -221,26 +220,16 @@ class _Problem:
 
     def residual(self, point: Array) -> Array:
         """Return the residuals that the best offsets and scales leave, flattened."""
-        return self._project(self._lobe(point))[0].ravel()
+        return self._projection(self._lobe(point))[0].ravel()
 
     def slope(self, point: Array) -> Array:
-        """Return ∂residual/∂point with the linear part projected out (Kaufman)."""
-        lobe, slopes = self._lobe(point), self._lobe_slopes(point)
-        _, gain, _, scale = self._project(lobe)
-        columns = []
-        for slope in slopes:
-            moved = gain * slope[:, None] * scale
-            for channel in range(moved.shape[1]):
-                basis = gain[:, channel, None] * np.stack([np.ones_like(lobe), lobe], axis=1)
-                inner = np.linalg.lstsq(basis, moved[:, channel], rcond=None)[0]
-                moved[:, channel] -= basis @ inner
-            columns.append(moved.ravel())
-        return np.stack(columns, axis=1)
+        """Return ∂residual/∂point with the linear part projected out."""
+        return self._projection.slope(self._lobe(point), self._lobe_slopes(point))
 
     def report(self, point: Array) -> LobeFit:
         """Return the fit at a point, with standard errors from the full Jacobian."""
         lobe, slopes = self._lobe(point), self._lobe_slopes(point)
-        residual, gain, offset, scale = self._project(lobe)
+        residual, gain, offset, scale = self._projection(lobe)
         if not scale.any():
             raise MdfconvError("the values do not fall with the angle: there is no lobe to fit")
         count, channels = residual.shape
@@ -253,22 +242,22 @@ class _Problem:
         flat = jacobian.reshape(count * channels, -1)
         unknowns = flat.shape[1]
         cost = float(np.sum(np.square(residual)))
-        spread = np.sqrt(cost / (residual.size - unknowns)) * _standard_deviations(flat)
+        spread = np.sqrt(cost / (residual.size - unknowns)) * standard_deviations(flat)
         distribution, parameters = self._at(point), np.exp(point)
         if self._gamma_range:
             parameters[1] = distribution.gamma
         likelihood = residual.size * np.log(max(cost, np.finfo(float).tiny) / residual.size)
         if not self._log:
             likelihood += 2 * residual.size * np.log(self._unit)
-        model = _model(lobe, offset, scale)
+        near = model(lobe, offset, scale)
         return LobeFit(
             distribution=distribution,
             parameters=tuple(parameters.tolist()),
             errors=tuple((parameters * spread[: point.size]).tolist()),
             offset=tuple((self._unit * offset).tolist()),
             scale=tuple((self._unit * scale).tolist()),
-            rmse=self._unit * float(np.sqrt(np.mean(np.square(model - self._values)))),
-            log_rmse=_log_rmse(model, self._values),
+            rmse=self._unit * float(np.sqrt(np.mean(np.square(near - self._values)))),
+            log_rmse=log_rmse(near, self._values),
             aic=float(likelihood + 2 * unknowns),
             bic=float(likelihood + unknowns * np.log(residual.size)),
         )
@@ -306,62 +295,7 @@ class _Problem:
             slopes.append(rise / np.log(self._at(high).gamma / self._at(low).gamma))
         return slopes
 
-    def _project(self, lobe: Array) -> tuple[Array, Array, Array, Array]:
-        """Return residuals, their gain ∂residual/∂model, offsets and scales.
-
-        A lobe has shape (..., n), residuals and gain (..., n, channels), the others
-        (..., channels).
-        """
-        values, ones = self._values, np.ones_like(self._values)
-        offset, scale = _solve(lobe, values, ones)
-        if not self._log:
-            return _model(lobe, offset, scale) - values, ones, offset, scale
-        smallest = _SMALLEST_MODEL * values.min(axis=0)
-        offset, scale = _solve(lobe, values, 1 / np.square(values))
-        for _ in range(_LOG_STEPS):
-            model = np.maximum(_model(lobe, offset, scale), smallest)
-            # One Gauss-Newton step for the logarithms is a weighted linear fit.
-            working = model * (1 + np.log(values / model))
-            offset, scale = _solve(lobe, working, 1 / np.square(model))
-        model = np.maximum(_model(lobe, offset, scale), smallest)
-        return np.log(model / values), 1 / model, offset, scale
-
-
-def _model(lobe: Array, offset: Array, scale: Array) -> Array:
-    """Return offset + scale · lobe, shape (..., n, channels)."""
-    return offset[..., None, :] + lobe[..., None] * scale[..., None, :]
-
-
-def _solve(lobe: Array, values: Array, weight: Array) -> tuple[Array, Array]:
-    """Return weighted least-squares offset and scale ≥ 0 of each channel."""
-    total = weight.sum(axis=-2)
-    centre = (weight * lobe[..., None]).sum(axis=-2) / total
-    mean = (weight * values).sum(axis=-2) / total
-    centred = lobe[..., None] - centre[..., None, :]
-    spread = (weight * np.square(centred)).sum(axis=-2)
-    shared = (weight * centred * (values - mean[..., None, :])).sum(axis=-2)
-    # A lobe points outwards: a negative scale would be a hole.
-    scale = np.where(spread > 0, np.maximum(shared, 0) / np.where(spread > 0, spread, 1), 0)
-    return mean - scale * centre, scale
-
 
 def _logarithms(candidates: Array) -> Array:
     """Return the logarithms of those that exist, ascending."""
     return np.log(np.sort(candidates[np.isfinite(candidates)]))
-
-
-def _standard_deviations(jacobian: Array) -> Array:
-    """Return the square roots of the diagonal of (JᵀJ)⁻¹, without forming JᵀJ."""
-    norms = np.linalg.norm(jacobian, axis=0)
-    norms = np.where(norms > 0, norms, 1)
-    _, singular, basis = np.linalg.svd(jacobian / norms, full_matrices=False)
-    singular = np.maximum(singular, np.finfo(float).tiny)
-    return np.linalg.norm(basis / singular[:, None], axis=0) / norms
-
-
-def _log_rmse(model: Array, values: Array) -> float:
-    positive = (model > 0) & (values > 0)
-    if not positive.any():
-        return float("nan")
-    ratio = np.log(model[positive] / values[positive])
-    return float(np.sqrt(np.mean(np.square(ratio))))

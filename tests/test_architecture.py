@@ -31,6 +31,7 @@ ABOUT_PARTICULAR_ONES = {
     "reports/lights_page.py": "the pair that was rendered, and laws of particular pairs",
     "cli/furnace_command.py": "the names of BRDFs",
     "cli/compare_command.py": "the names of BRDFs",
+    "reports/fit_report.py": "the forms in which files store a lobe",
     "measured/brdf_fit.py": "Schlick's Fresnel factor",
     "distributions/dialects.py": "whose parameter a program stores",
     "scene/light.py": "what lights are described by",

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from concurrent.futures import ProcessPoolExecutor
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
+from shlex import join
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -19,16 +23,20 @@ from mdfconv.cli.options import (
     chosen_gamma,
 )
 from mdfconv.cli.outputs import check_outputs
-from mdfconv.cli.tables import form_of, table_text, tell, write_table
+from mdfconv.cli.tables import form_of, progress, table_text, tell, write_table
 from mdfconv.errors import MdfconvError
 from mdfconv.output.files import file_bytes, write_files
 
 if TYPE_CHECKING:
     from mdfconv.distributions import Distribution
-    from mdfconv.measured.lobe_fit import LobeFit
-    from mdfconv.measured.samples import Samples
+    from mdfconv.measured.analysis import Analysis, FitOptions, Measurements
+    from mdfconv.measured.text import Columns
 
-_BRDF_LIMIT = 80.0  # degrees
+# Of what a table on a terminal shows of fits to two directions.
+_SHOWN_OF_BRDFS = (
+    "distribution", "parameter", "stderr", "gamma", "reflectance", "diffuse", "specular", "rmse",
+    "error", "masking", "simplest",
+)  # fmt: skip
 
 
 class Quantity(StrEnum):
@@ -43,10 +51,19 @@ class Loss(StrEnum):
 
     linear = "linear"
     log = "log"
+    cosine = "cosine"
+
+
+class Masking(StrEnum):
+    """The masking of a BRDF."""
+
+    smith = "smith"
+    v_cavity = "v-cavity"
+    none = "none"
 
 
 def command(
-    data: Annotated[Path, typer.Argument(metavar="DATA", help="File of samples.")],
+    data: Annotated[list[Path], typer.Argument(metavar="DATA...", help="Files of samples.")],
     targets: Annotated[
         list[str] | None,
         typer.Option("--to", metavar="MDF", help="Distribution to fit; repeatable; default all."),
@@ -70,15 +87,38 @@ def command(
     ] = None,
     max_angle: Annotated[
         float | None,
-        typer.Option(metavar="DEG", help="Leave out larger angles; 80 by default for brdf."),
+        typer.Option(
+            metavar="DEG", help="Leave out larger angles; 80 by default for brdf at θ_d ≈ 0."
+        ),
     ] = None,
     separate: Annotated[
         bool,
         typer.Option("--separate", help="Fit every channel on its own, not with one parameter."),
     ] = False,
-    loss: Annotated[Loss, typer.Option(help="Squared residuals, or those of logarithms.")] = (
-        Loss.linear
-    ),
+    loss: Annotated[
+        Loss,
+        typer.Option(
+            help="Squared residuals, those of logarithms, or of two directions those of f_r "
+            "cos θ_i cos θ_o."
+        ),
+    ] = Loss.linear,
+    masking: Annotated[
+        Masking | None,
+        typer.Option(
+            help="Of two directions: smith, where a distribution has its Λ, else v-cavity; or one "
+            "for all."
+        ),
+    ] = None,
+    fresnel: Annotated[
+        str | None,
+        typer.Option(
+            metavar="F",
+            help="Of two directions: none (default), schlick (F₀ 0.04), ior:N, or fit (F₀ free).",
+        ),
+    ] = None,
+    robust: Annotated[
+        bool, typer.Option("--robust", help="Of two directions: let outliers count less.")
+    ] = False,
     gamma: GammaOption = None,
     tolerance: Annotated[
         float,
@@ -87,13 +127,21 @@ def command(
     format_: FormatOption = None,
     output: OutputOption = None,
     png: PngOption = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            "--report",
+            metavar="FILE",
+            help="Write a page for a colleague: .html, or .md with its pictures.",
+        ),
+    ] = None,
 ) -> None:
     """Fit distributions to measured reflectance or to a measured distribution of normals.
 
-    The model is offset + scale · D̄(β); a second parameter is fitted, too, unless --gamma gives it.
-    Reads text (CSV, TSV, blanks; an angle and one or more
-    values a row), ALTA's 1-D text format and MERL's .binary. Ranks the fits, best first, and
-    marks the simplest one that is nearly as good.
+    Of one angle, that of the half vector, the model is offset + scale · D̄(β); of two directions
+    k_d/π + k_s D G F / (4 cos θ_i cos θ_o). A second parameter is fitted, too, unless --gamma
+    gives it. Ranks the fits, best first, and marks the simplest one that is nearly as good.
+    Several files make one table.
 
     Examples:
 
@@ -102,97 +150,115 @@ def command(
     mdfconv fit lobe.csv --to ggx --to beckmann --png lobe.png
 
     mdfconv fit scan.txt --angle theta --angle-unit degrees --values red --loss log
+
+    mdfconv fit paint.csv --loss log --fresnel fit --report paint.html
+
+    mdfconv fit '*.csv' --format csv -o fits.csv
     """
-    if not tolerance >= 0:
-        raise MdfconvError("--tolerance is not negative")
-    check_outputs(png, output, inputs=[data])
-    fixed = chosen_gamma(gamma)
-    shape = fixed if isinstance(fixed, float) else None
-    samples = _restrict(_read(data, angle, angle_unit, values), quantity, max_angle, data)
-    parts = _parts(samples) if separate else [samples]
-    distributions = _targets(targets, shape)
-    results = [_fit(part, distributions, loss, shape, tolerance, data) for part in parts]
+    outputs = check_outputs(png, output, report, inputs=data)
+    if len(data) > 1 and (png or report):
+        raise MdfconvError("--png and --report are of one file")
+    options = _options(
+        targets, gamma, _model(loss, masking, fresnel, robust=robust), quantity, max_angle,
+        tolerance, separate=separate,
+    )  # fmt: skip
+    columns = _columns(angle, angle_unit, values)
+    only_two = bool(masking or fresnel or robust or loss is Loss.cosine)
+    analyses = _analyses(data, columns, options, only_two=only_two)
     form = form_of(format_, output)
-    columns, rows = _table(results, form, separate)
-    contents = {}
-    if output:
-        contents[output] = file_bytes(table_text(columns, rows, form))
+    names, rows = _table(analyses, form, separate)
+    contents = {output: file_bytes(table_text(names, rows, form))} if output else {}
+    logarithms = loss is Loss.log
     if png:
-        contents[png] = _picture(results[0], data.name, many=samples.values.shape[1] > 1)
+        from mdfconv.reports.fit_pages import draw_analysis
+
+        contents[png] = draw_analysis(analyses[0], logarithms=logarithms)
+    if report:
+        contents |= _report(analyses[0], report, separate=separate, logarithms=logarithms)
+    if len(contents) > len(outputs):
+        check_outputs(*(path for path in contents if path not in outputs), inputs=data)
     write_files(contents)
     if not output:
-        write_table(columns, rows, form, title=f"Fits to {data.name}")
-    _tell(samples, results, tolerance, separate)
+        title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
+        write_table(names, rows, form, title=title)
+    for analysis in analyses:
+        _tell(analysis, tolerance, named=len(analyses) > 1)
 
 
-@dataclass(frozen=True)
-class _Result:
-    """The fits to one set of samples, best first, and the simplest good one."""
+def _model(loss: Loss, masking: Masking | None, fresnel: str | None, *, robust: bool) -> Any:
+    from mdfconv.measured.brdf_fit import BrdfModel
 
-    samples: Samples
-    fits: list[LobeFit]
-    simplest: LobeFit
+    used = masking.value if masking else Masking.smith.value
+    return BrdfModel(loss.value, used, fresnel or "none", robust)
 
 
-def _fit(
-    samples: Samples,
-    targets: Sequence[Distribution],
-    loss: Loss,
-    gamma: float | None,
+def _options(
+    targets: list[str] | None,
+    gamma: str | None,
+    model: Any,
+    quantity: Quantity | None,
+    max_angle: float | None,
     tolerance: float,
-    path: Path,
-) -> _Result:
-    from mdfconv.measured.lobe_fit import fit_lobe, rank, simplest
+    *,
+    separate: bool,
+) -> FitOptions:
+    from mdfconv.measured.analysis import FitOptions
 
-    try:
-        fits = [fit_lobe(samples, target, loss.value, gamma=gamma) for target in targets]
-    except MdfconvError as error:
-        raise MdfconvError(f"{path}: {error}") from None
-    return _Result(samples, rank(fits, loss), simplest(fits, tolerance, loss))
-
-
-def _table(
-    results: list[_Result], form: Format, separate: bool
-) -> tuple[list[str], list[dict[str, Any]]]:
-    rows = []
-    for result in results:
-        channel = {"channel": result.samples.channels[0]} if separate else {}
-        rows += [channel | _record(fit, fit is result.simplest) for fit in result.fits]
-    return list(rows[0]), _shown(rows, form)
+    fixed = chosen_gamma(gamma)
+    shape = fixed if isinstance(fixed, float) else None
+    return FitOptions(
+        targets=tuple(_targets(targets, shape)),
+        gamma=shape,
+        model=model,
+        quantity=quantity.value if quantity else None,
+        max_angle=max_angle,
+        separate=separate,
+        tolerance=tolerance,
+    )
 
 
-def _picture(result: _Result, name: str, *, many: bool) -> bytes:
-    from mdfconv.reports.fit_figure import draw_fits
+def _columns(angle: str, unit: str | None, values: list[str] | None) -> Columns:
+    from mdfconv.measured.text import Columns
 
-    channel = f", channel {result.samples.channels[0]}" if many else ""
-    return draw_fits(result.samples, result.fits, name + channel)
+    return Columns(angle, unit, tuple(values or ()))
 
 
-def _tell(samples: Samples, results: list[_Result], tolerance: float, separate: bool) -> None:
-    """Write notes and verdicts to standard error."""
-    limited = [fit.distribution for result in results for fit in result.fits if fit.at_limit]
-    notes = [
-        f"γ of {name} is at the end of the range that is searched"
-        for name in dict.fromkeys(distribution.name for distribution in limited)
-    ]
-    for note in (*samples.notes, *notes):
-        tell(f"note: {note}")
-    for result in results:
-        channel = f"channel {result.samples.channels[0]}: " if separate else ""
-        cheap = result.simplest.distribution
-        tell(
-            f"{channel}best is {result.fits[0].distribution.name}; simplest within "
-            f"{100 * tolerance:g} % of its error is {cheap.name}, at {cheap.operations} "
-            "operations an evaluation"
+def _analyses(
+    files: Sequence[Path], columns: Columns, options: FitOptions, *, only_two: bool
+) -> list[Analysis]:
+    """Return the fits to each file; to several in processes."""
+    work = partial(_analyse, columns=columns, options=options, only_two=only_two)
+    if len(files) == 1:
+        return [work(files[0])]
+    analyses = []
+    with (
+        progress("Files", len(files)) as advance,
+        ProcessPoolExecutor(min(len(files), os.cpu_count() or 1)) as pool,
+    ):
+        for analysis in pool.map(work, files):
+            analyses.append(analysis)
+            advance(1)
+    return analyses
+
+
+def _analyse(path: Path, columns: Columns, options: FitOptions, *, only_two: bool) -> Analysis:
+    from mdfconv.measured.analysis import analyse
+    from mdfconv.measured.directional import DirectionalSamples
+
+    samples = _read(path, columns)
+    if only_two and not isinstance(samples, DirectionalSamples):
+        raise MdfconvError(
+            f"{path}: --masking, --fresnel, --robust and --loss cosine need two directions",
+            "this file has one angle",
         )
+    return analyse(path.name, samples, options)
 
 
-def _read(path: Path, angle: str, unit: str | None, values: list[str] | None) -> Samples:
+def _read(path: Path, columns: Columns) -> Measurements:
     from mdfconv.measured.merl import read_merl
-    from mdfconv.measured.text import Columns, read_text
+    from mdfconv.measured.text import read_text
 
     try:
-        columns = Columns(angle, unit, tuple(values or ()))
         if path.suffix.lower() == ".binary":
             columns.refuse(path, "a MERL file has no columns")
             return read_merl(path)
@@ -201,28 +267,51 @@ def _read(path: Path, angle: str, unit: str | None, values: list[str] | None) ->
         raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
 
 
-def _restrict(
-    samples: Samples, quantity: Quantity | None, max_angle: float | None, path: Path
-) -> Samples:
-    """Set the quantity, leave out angles beyond the limit, and say what the model leaves out."""
-    import numpy as np
+def _table(
+    analyses: Sequence[Analysis], form: Format, separate: bool
+) -> tuple[list[str], list[dict[str, Any]]]:
+    """Return the names of the columns and a row for each fit."""
+    rows = []
+    for analysis in analyses:
+        file = {"file": analysis.name} if len(analyses) > 1 else {}
+        for result in analysis.results:
+            channel = {"channel": result.samples.channels[0]} if separate else {}
+            rows += [file | channel | record for record in result.records()]
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    rows = [{name: row.get(name) for name in names} for row in rows]
+    if form is Format.table and "specular" in names:
+        names = [name for name in names if name in ("file", "channel", *_SHOWN_OF_BRDFS)]
+        names = [name for name in names if any(row[name] is not None for row in rows)]
+        rows = [{name: row[name] for name in names} for row in rows]
+    return names, _shown(rows, form)
 
-    kind = quantity.value if quantity else samples.quantity
-    limit = max_angle if max_angle is not None else (_BRDF_LIMIT if kind == "brdf" else 90.0)
-    if not 0 < limit <= 90:
-        raise MdfconvError("--max-angle is above 0 and at most 90 degrees")
-    keep = samples.beta <= np.radians(limit) * (1 + 1e-12)
-    notes = samples.notes
-    if kind == "brdf":
-        notes = (*notes, "brdf: the lobe is D̄/cos²β at θ_d = 0; masking is left out")
-    if not keep.all():
-        count = int(np.count_nonzero(~keep))
-        notes = (*notes, f"{count} of {keep.size} samples beyond {limit:g}° are left out")
-    if not keep.any():
-        raise MdfconvError(f"{path}: no samples up to {limit:g}°")
-    return replace(
-        samples, beta=samples.beta[keep], values=samples.values[keep], quantity=kind, notes=notes
-    )
+
+def _report(
+    analysis: Analysis, path: Path, *, separate: bool, logarithms: bool
+) -> dict[Path, bytes]:
+    from mdfconv.reports.fit_pages import report_of
+    from mdfconv.reports.fit_report import report_files
+
+    _, rows = _table([analysis], Format.table, separate)
+    texts = [{name: str(value) for name, value in row.items()} for row in rows]
+    line = join(["mdfconv", *sys.argv[1:]])
+    return report_files(report_of(analysis, texts, line, logarithms=logarithms), path)
+
+
+def _tell(analysis: Analysis, tolerance: float, *, named: bool) -> None:
+    """Write notes and verdicts to standard error."""
+    file = f"{analysis.name}: " if named else ""
+    for note in analysis.notes:
+        tell(f"{file}note: {note}")
+    for result in analysis.results:
+        channels = result.samples.channels
+        channel = f"channel {channels[0]}: " if len(analysis.results) > 1 else ""
+        cheap = result.simplest.distribution
+        tell(
+            f"{file}{channel}best is {result.fits[0].distribution.name}; simplest within "
+            f"{100 * tolerance:g} % of its error is {cheap.name}, at {cheap.operations} "
+            "operations an evaluation"
+        )
 
 
 def _targets(names: list[str] | None, gamma: float | None) -> list[Distribution]:
@@ -257,31 +346,6 @@ def _targets(names: list[str] | None, gamma: float | None) -> list[Distribution]
     for target in illegal:
         tell(f"note: {target.name} is left out: it has no γ = {gamma:g}")
     return [target for target in targets if target not in illegal]
-
-
-def _parts(samples: Samples) -> list[Samples]:
-    return [
-        replace(samples, values=samples.values[:, place : place + 1], channels=(name,))
-        for place, name in enumerate(samples.channels)
-    ]
-
-
-def _record(fit: LobeFit, is_simplest: bool) -> dict[str, Any]:
-    free = len(fit.parameters) > 1
-    return {
-        "distribution": fit.distribution.name,
-        "parameter": fit.parameters[0],
-        "gamma": fit.parameters[1] if free else fit.distribution.gamma,
-        "stderr": fit.errors[0],
-        "gamma_stderr": fit.errors[1] if free else None,
-        "offset": list(fit.offset),
-        "scale": list(fit.scale),
-        "rmse": fit.rmse,
-        "log_rmse": fit.log_rmse,
-        "aic": fit.aic,
-        "bic": fit.bic,
-        "simplest": is_simplest,
-    }
 
 
 def _shown(rows: list[dict[str, Any]], form: Format) -> list[dict[str, Any]]:

@@ -104,8 +104,8 @@ class BrdfFit:
         Root mean square of the loss's residuals.
     aic, bic : float
         Information criteria of the loss's residuals.
-    masking : str
-        The masking that was used.
+    masking, fresnel : str
+        The masking that was used, and the Fresnel factor, as in `BrdfModel`.
     notes : tuple of str
         What the data do not tell, and parameters at an end of their range.
     """
@@ -123,7 +123,16 @@ class BrdfFit:
     aic: float
     bic: float
     masking: str
+    fresnel: str
     notes: tuple[str, ...] = field(default=())
+
+    def model(self, data: DirectionalSamples) -> Array:
+        """Return f_r of the fit for the directions of samples, 1/sr, shape (n, channels)."""
+        geometry = _Geometry(data, BrdfModel())
+        parameter = np.array([self.parameters[self.distribution.parameter.name]])
+        fresnel = geometry.fresnel(self.parameters.get("reflectance", self.fresnel))
+        lobe = geometry.lobe(self.distribution, parameter, self.masking) * fresnel
+        return model(lobe, np.array(self.diffuse) / np.pi, np.array(self.specular))
 
 
 def fit_brdf(
@@ -172,11 +181,6 @@ def fit_brdf(
     return problem.report(point)
 
 
-def rank_fits(fits: list[BrdfFit]) -> list[BrdfFit]:
-    """Return fits by the error of their loss, the smallest first."""
-    return sorted(fits, key=lambda fit: fit.error)
-
-
 def _index(text: str) -> float:
     """Return N of ``"ior:N"``."""
     head, _, number = text.partition(":")
@@ -208,6 +212,35 @@ class _Geometry:
         self.v_cavity = v_cavity(incident, outgoing, half)
         self.values = values[keep]
 
+    def fresnel(self, kind: str | float) -> Array | float:
+        """Return F of a kind of `BrdfModel`, 1 for one that is to be fitted, or for an F₀."""
+        if kind in ("none", "fit"):
+            return 1.0
+        if kind == "schlick":
+            return schlick_fresnel(self.difference)
+        if isinstance(kind, str):
+            return dielectric(self.difference, _index(kind))
+        return schlick_fresnel(self.difference, kind)
+
+    def lobe(self, mdf: Distribution, parameter: Array, masking: str) -> Array:
+        """Return D G / (4 cos θ_i cos θ_o), shape (n,), for a parameter, shape (1,)."""
+        with np.errstate(all="ignore"):
+            value = mdf.shape(self.beta, parameter)
+            value *= mdf.maximum(parameter, normalized=True)
+            value /= 4 * np.prod(self.cosines, axis=0)
+            value *= self._masking(mdf, parameter, masking)
+        return value
+
+    def _masking(self, mdf: Distribution, parameter: Array, masking: str) -> Array | float:
+        form = _smith_form(mdf, parameter)
+        if masking == "none":
+            return 1.0
+        if masking == "v-cavity" or form is None:
+            return self.v_cavity
+        smith, alpha = form
+        incident, outgoing = (smith.smith_lambda(alpha * tangent) for tangent in self.tangents)
+        return 1 / (1 + incident + outgoing)
+
     def part(self, index: NDArray[np.intp]) -> _Geometry:
         """Return some of the samples."""
         some = object.__new__(_Geometry)
@@ -235,7 +268,6 @@ class _Problem:
         self._unit = float(np.max(np.abs(geometry.values)))
         self._check()
         product = np.prod(geometry.cosines, axis=0)
-        self._denominator = 4 * product
         self._weight = np.square(product) if options.loss == "cosine" else np.ones_like(product)
         if weight is not None:
             self._weight = self._weight * weight
@@ -245,7 +277,8 @@ class _Problem:
             weight=self._weight[:, None],
             floor=True,
         )
-        self._fresnel, self._used_masking = self._fixed_fresnel(), self._masking()
+        self._fresnel = geometry.fresnel(options.fresnel)
+        self._used_masking = self._masking()
         low = [np.log(max(target.parameter.lower, 1e-8))]
         high = [np.log(min(target.parameter.upper, 1e12))]
         if self._gamma_range:
@@ -387,6 +420,7 @@ class _Problem:
             aic=float(likelihood + 2 * unknowns),
             bic=float(likelihood + unknowns * np.log(count)),
             masking=self._used_masking,
+            fresnel=self._options.fresnel,
             notes=(*self._at_ends(point), *_undetermined(triangle, names)),
         )
 
@@ -409,13 +443,10 @@ class _Problem:
 
     def _lobe(self, point: Array) -> Array:
         """Return D G F / (4 cos θ_i cos θ_o), shape (n,)."""
+        reflectance = float(point[-1]) if self._free_reflectance else None
+        fresnel = self._fresnel if reflectance is None else self._geometry.fresnel(reflectance)
         mdf, parameter = self._at(point), np.exp(point[:1])
-        with np.errstate(all="ignore"):
-            value = mdf.shape(self._geometry.beta, parameter)
-            value *= mdf.maximum(parameter, normalized=True)
-            value *= self._g(mdf, parameter)
-            value /= self._denominator
-        return value * self._f(point)
+        return self._geometry.lobe(mdf, parameter, self._used_masking) * fresnel
 
     def _slopes(self, point: Array) -> list[Array]:
         """Return the slopes of the lobe in each parameter, by differences within the bounds."""
@@ -434,29 +465,6 @@ class _Problem:
         return (
             "v-cavity" if self._options.masking == "smith" and not known else self._options.masking
         )
-
-    def _g(self, mdf: Distribution, parameter: Array) -> Array | float:
-        if self._used_masking == "none":
-            return 1.0
-        form = _smith_form(mdf, parameter) if self._used_masking == "smith" else None
-        if form is None:
-            return self._geometry.v_cavity
-        smith, alpha = form
-        incident, outgoing = (smith.smith_lambda(alpha * t) for t in self._geometry.tangents)
-        return 1 / (1 + incident + outgoing)
-
-    def _f(self, point: Array) -> Array | float:
-        if not self._free_reflectance:
-            return self._fresnel
-        return schlick_fresnel(self._geometry.difference, point[-1])
-
-    def _fixed_fresnel(self) -> Array | float:
-        cosine, kind = self._geometry.difference, self._options.fresnel
-        if kind in ("none", "fit"):
-            return 1.0
-        if kind == "schlick":
-            return schlick_fresnel(cosine)
-        return dielectric(cosine, _index(kind))
 
 
 def _smith_form(mdf: Distribution, parameter: Array) -> tuple[Distribution, Array] | None:

@@ -49,6 +49,8 @@ class LobeFit:
     rmse, log_rmse : float
         Root mean square of the residuals, and of those of the natural logarithms where both
         sample and model are positive.
+    error : float
+        The one of the two that the loss minimizes.
     aic, bic : float
         Information criteria of the loss's residuals.
     """
@@ -60,6 +62,7 @@ class LobeFit:
     scale: tuple[float, ...]
     rmse: float
     log_rmse: float
+    error: float
     aic: float
     bic: float
 
@@ -114,25 +117,6 @@ def fit_lobe(
     solutions = [problem.refine(start) for start in problem.starts()]
     _, point = min(solutions, key=lambda solution: solution[0])
     return problem.report(point)
-
-
-def simplest(fits: list[LobeFit], tolerance: float, loss: str) -> LobeFit:
-    """Return the cheapest of fits whose error is within a relative tolerance of the best.
-
-    Cheapest has the fewest parameters, then the fewest operations per evaluation.
-    """
-    best = min(_error(fit, loss) for fit in fits)
-    good = [fit for fit in fits if _error(fit, loss) <= (1 + tolerance) * best]
-    return min(good, key=lambda fit: (len(fit.parameters), fit.distribution.operations))
-
-
-def rank(fits: list[LobeFit], loss: str) -> list[LobeFit]:
-    """Return fits by the error of the loss, the smallest first."""
-    return sorted(fits, key=lambda fit: _error(fit, loss))
-
-
-def _error(fit: LobeFit, loss: str) -> float:
-    return fit.log_rmse if loss == "log" else fit.rmse
 
 
 class _Problem:
@@ -250,14 +234,17 @@ class _Problem:
         if not self._log:
             likelihood += 2 * residual.size * np.log(self._unit)
         near = model(lobe, offset, scale)
+        rmse = self._unit * float(np.sqrt(np.mean(np.square(near - self._values))))
+        of_logarithms = log_rmse(near, self._values)
         return LobeFit(
             distribution=distribution,
             parameters=tuple(parameters.tolist()),
             errors=tuple((parameters * spread[: point.size]).tolist()),
             offset=tuple((self._unit * offset).tolist()),
             scale=tuple((self._unit * scale).tolist()),
-            rmse=self._unit * float(np.sqrt(np.mean(np.square(near - self._values)))),
-            log_rmse=log_rmse(near, self._values),
+            rmse=rmse,
+            log_rmse=of_logarithms,
+            error=of_logarithms if self._log else rmse,
             aic=float(likelihood + 2 * unknowns),
             bic=float(likelihood + unknowns * np.log(residual.size)),
         )

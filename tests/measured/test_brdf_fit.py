@@ -10,8 +10,9 @@ import mdfconv
 from mdfconv.brdf.microsurface import Microsurface
 from mdfconv.distributions import one_parameter_distributions
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.brdf_fit import BrdfModel, fit_brdf, rank_fits
+from mdfconv.measured.brdf_fit import BrdfModel, fit_brdf
 from mdfconv.measured.directional import directional_samples
+from mdfconv.measured.ranking import rank
 
 INCIDENCES = np.radians([5, 15, 25, 35, 45, 55, 62, 68])
 NAMES = [mdf.name for mdf in one_parameter_distributions()]
@@ -89,6 +90,7 @@ def test_exact_data_come_back(name, loss):
     assert found.diffuse[0] == pytest.approx(0.3, rel=1e-4)
     assert found.specular[0] == pytest.approx(0.8, rel=1e-3)
     assert found.error < 1e-4
+    np.testing.assert_allclose(found.model(data), data.values, rtol=1e-3)
     assert found.masking == ("smith" if name in SMITH else "v-cavity")
 
 
@@ -167,7 +169,7 @@ def test_outliers():
 def test_the_model_of_the_data_ranks_first():
     data = measured(np.random.default_rng(7), "sawicki", count=30)
     fits = [fit_brdf(data, mdf, BrdfModel(loss="log")) for mdf in one_parameter_distributions()]
-    ranked = rank_fits(fits)
+    ranked = rank(fits)
     assert ranked[0].distribution.name == "sawicki"
     assert ranked[0].aic == min(fit.aic for fit in fits)
 

@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import curve_fit
 
 import mdfconv
-from mdfconv.measured.lobe_fit import fit_lobe, foreshortening, rank, simplest
+from mdfconv.measured.lobe_fit import fit_lobe, foreshortening
+from mdfconv.measured.ranking import rank, simplest
 from mdfconv.measured.samples import Samples
 
 BETA = np.radians(np.arange(0, 88, 1.5))
@@ -155,11 +156,11 @@ def test_logarithmic_loss_against_curve_fit():
 def test_ranking_and_the_simplest():
     data = synthetic("ggx", np.random.default_rng(8), offsets=(0.1, 0.1), scales=(2.0, 1.0))
     fits = [fit_lobe(data, target) for target in mdfconv.list_distributions()]
-    ranked = rank(fits, "linear")
+    ranked = rank(fits)
     assert [fit.rmse for fit in ranked] == sorted(fit.rmse for fit in fits)
-    assert simplest(fits, 0.05, "linear").distribution.name == "ggx"
-    assert simplest(fits, 1e9, "linear").distribution.name == "ggx"
-    assert simplest(fits, 0, "linear") in ranked[:3]
+    assert simplest(fits, 0.05).distribution.name == "ggx"
+    assert simplest(fits, 1e9).distribution.name == "ggx"
+    assert simplest(fits, 0) in ranked[:3]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,158 @@
+"""The page on a fit to measurements that a colleague can read, in one file."""
+
+from __future__ import annotations
+
+import base64
+import html
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mdfconv import __version__
+from mdfconv.conversion import convert
+from mdfconv.conversion.endpoint import Endpoint
+from mdfconv.distributions import Distribution
+from mdfconv.errors import MdfconvError
+from mdfconv.output.files import file_bytes
+from mdfconv.output.records import markdown_text
+
+_DIGITS = 6
+# What a number is handed on as: to renderers with light from all around.
+_METRIC = "environment"
+
+
+@dataclass(frozen=True)
+class FitReport:
+    """What a report says.
+
+    Parameters
+    ----------
+    title : str
+        What was measured.
+    facts : sequence of str
+        What the data are, what was left out and why, and what was assumed.
+    rows : sequence of mapping
+        The table of fits, best first: text for each column.
+    verdict : str
+        The distribution that is recommended, and why.
+    snippets : mapping of str to str
+        The recommended number in the forms of files, by their names.
+    pictures : mapping of str to bytes
+        PNGs, by what they show.
+    command : str
+        What makes the page again.
+    """
+
+    title: str
+    facts: Sequence[str]
+    rows: Sequence[Mapping[str, str]]
+    verdict: str
+    snippets: Mapping[str, str]
+    pictures: Mapping[str, bytes]
+    command: str
+
+
+def report_files(report: FitReport, path: Path) -> dict[Path, bytes]:
+    """Return the files of a report: one of HTML, or of Markdown with pictures beside it.
+
+    Raises
+    ------
+    MdfconvError
+        If the name ends in neither ``.html`` nor ``.md``.
+    """
+    suffix = path.suffix.lower()
+    if suffix in (".html", ".htm"):
+        return {path: html_page(report)}
+    if suffix == ".md":
+        return _markdown(report, path)
+    raise MdfconvError(f"a report is an .html or a .md file, not {path.name}")
+
+
+def html_page(report: FitReport) -> bytes:
+    """Return the report as one file of HTML that needs no other."""
+    escape = html.escape
+    columns = list(report.rows[0])
+    head = "".join(f"<th>{escape(column)}</th>" for column in columns)
+    body = "".join(
+        f"<tr>{''.join(f'<td>{escape(row[column])}</td>' for column in columns)}</tr>\n"
+        for row in report.rows
+    )
+    facts = "".join(f"<li>{escape(fact)}</li>\n" for fact in report.facts)
+    snippets = "".join(
+        f"<h3>{escape(name)}</h3>\n<pre>{escape(text)}</pre>\n"
+        for name, text in report.snippets.items()
+    )
+    pictures = "".join(
+        f'<h3>{escape(name)}</h3>\n<img alt="{escape(name)}" '
+        f'src="data:image/png;base64,{base64.b64encode(data).decode()}">\n'
+        for name, data in report.pictures.items()
+    )
+    return file_bytes(
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta name="viewport" content="width=device-width">\n'
+        f"<title>{escape(report.title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
+        f"<h1>{escape(report.title)}</h1>\n<p><strong>{escape(report.verdict)}</strong></p>\n"
+        f"<h2>The data</h2>\n<ul>\n{facts}</ul>\n"
+        f"<h2>The fits</h2>\n<div><table><thead><tr>{head}</tr></thead>\n"
+        f"<tbody>\n{body}</tbody></table></div>\n"
+        f"<h2>The number to use</h2>\n{snippets}<h2>Data and fit</h2>\n{pictures}"
+        f"<h2>Made by</h2>\n<pre>{escape(report.command)}</pre>\n<p>mdfconv {__version__}</p>\n"
+        "</body>\n</html>"
+    )
+
+
+def snippets_of(mdf: Distribution, parameter: float) -> dict[str, str]:
+    """Return a fitted parameter in the forms of files, kept in the light of an environment."""
+    own = f"{mdf.label} {mdf.parameter.symbol} = {parameter:.{_DIGITS}g}"
+    # A number keeps its γ: the distribution carries it.
+    source = Endpoint(mdf)
+    try:
+        alpha = convert(parameter, source, "ggx", metric=_METRIC)
+        exponent = convert(parameter, source, "blinn-phong", metric=_METRIC)
+    except MdfconvError as error:
+        return {"mdfconv": f"{own}\n{error}"}
+    roughness = alpha**0.5
+    number, shininess = f"{roughness:.{_DIGITS}g}", f"{exponent:.{_DIGITS}g}"
+    return {
+        "mdfconv": f"{own}, as ggx:roughness {number} (--metric {_METRIC})",
+        "Wavefront MTL": f"Ns {shininess}\nPr {number}",
+        "glTF": f'"pbrMetallicRoughness": {{ "roughnessFactor": {number} }}',
+        "Mitsuba": '<bsdf type="roughconductor">\n'
+        '    <string name="distribution" value="ggx"/>\n'
+        f'    <float name="alpha" value="{alpha:.{_DIGITS}g}"/>\n</bsdf>',
+    }
+
+
+def _markdown(report: FitReport, path: Path) -> dict[Path, bytes]:
+    files, shown = {}, []
+    for name, data in report.pictures.items():
+        picture = path.with_name(f"{path.stem}-{re.sub(r'[^0-9A-Za-z]+', '-', name)}.png")
+        files[picture] = data
+        shown.append(f"### {name}\n\n![{name}]({picture.name})")
+    snippets = [f"### {name}\n\n```\n{text}\n```" for name, text in report.snippets.items()]
+    parts = [
+        f"# {report.title}",
+        f"**{report.verdict}**",
+        "## The data",
+        "\n".join(f"- {fact}" for fact in report.facts),
+        "## The fits",
+        markdown_text(list(report.rows[0]), list(report.rows)),
+        "## The number to use",
+        *snippets,
+        "## Data and fit",
+        *shown,
+        f"## Made by\n\n```\n{report.command}\n```\n\nmdfconv {__version__}",
+    ]
+    return {path: file_bytes("\n\n".join(parts)), **files}
+
+
+_STYLE = """
+:root { color-scheme: light dark; }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
+table { border-collapse: collapse; font-size: 0.9rem; }
+th, td { border-bottom: 1px solid #8886; padding: 0.2rem 0.6rem; text-align: left; }
+div { overflow-x: auto; }
+pre { background: #8882; padding: 0.6rem; overflow-x: auto; }
+img { max-width: 100%; height: auto; background: white; }
+"""

@@ -174,17 +174,27 @@ def write_conversions(
         for destination, original, conversion in converted
         if not (destination.backup and conversion.data == original)
     ]
-    backups: dict[Path, bytes] = {}
     contents: dict[Path, bytes] = {}
-    modes = {}
+    backups: dict[Path, Path] = {}
+    new: set[Path] = set()
     for destination, original, conversion in changed:
         if destination.backup:
-            backups[destination.backup] = original
-            modes[destination.output] = destination.output.stat().st_mode
+            _check_unchanged(destination.source, original)
+            contents[destination.backup] = original
+            backups[destination.backup] = destination.source
+            new.add(destination.backup)
+        else:
+            new.add(destination.output)
+        new |= set(conversion.files)
+    for destination, _, conversion in changed:
         for path, data in {destination.output: conversion.data, **conversion.files}.items():
             if contents.setdefault(path, data) != data:
                 raise MdfconvError(f"two results would both be written to {path}")
-    write_files(backups | contents)
-    for path, mode in modes.items():
-        path.chmod(mode)
+    write_files(contents, new=new, like=backups)
     return [destination for destination, *_ in changed]
+
+
+def _check_unchanged(path: Path, original: bytes) -> None:
+    """Raise if a file is no longer what was read: somebody else is at it."""
+    if read_file(path) != original:
+        raise MdfconvError(f"will not change {path}: it has changed since it was read")

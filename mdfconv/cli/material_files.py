@@ -28,7 +28,12 @@ class ReportFormat(StrEnum):
 
 ResultOption = Annotated[
     str | None,
-    typer.Option("--output", "-o", metavar="OUT", help="New file, or a folder that exists."),
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="OUT",
+        help="New file, or a folder: one that exists, or out/ with a slash.",
+    ),
 ]
 InPlaceOption = Annotated[
     bool,

@@ -139,7 +139,12 @@ OutputOption = Annotated[
 ]
 FolderOption = Annotated[
     Path | None,
-    typer.Option("--output", "-o", metavar="DIR", help="Folder to write to; by default ./reports."),
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="DIR",
+        help="Folder to write to, created if it is not there; by default ./reports.",
+    ),
 ]
 PngOption = Annotated[
     Path | None, typer.Option("--png", metavar="FILE", help="Draw the result into a picture.")

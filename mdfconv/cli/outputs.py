@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mdfconv.cli.tables import tell
 from mdfconv.errors import MdfconvError
-from mdfconv.output.files import is_stream, write_files
+from mdfconv.output.files import create_folder, is_stream, write_files
 
 _DEFAULT_FOLDER = Path("reports")
 
@@ -38,23 +38,15 @@ def check_outputs(*outputs: Path | None, inputs: Sequence[Path] = ()) -> list[Pa
 
 
 def check_folder(folder: Path | None) -> Path:
-    """Return the folder to write to, if it can be written.
-
-    Without a choice it is ``./reports``, created if it is not there; a chosen one must exist.
+    """Return the folder to write to, created if it is not there; without a choice ./reports.
 
     Raises
     ------
     MdfconvError
-        If it is not a folder or cannot be written to.
+        If it is not a folder, or cannot be created or written to.
     """
     chosen = folder or _DEFAULT_FOLDER
-    if folder is None:
-        try:
-            chosen.mkdir(exist_ok=True)
-        except OSError as error:
-            raise MdfconvError(f"cannot create {chosen}: {error.strerror}") from None
-    if not chosen.is_dir():
-        raise MdfconvError(f"{chosen} is not an existing directory")
+    create_folder(chosen)
     if not os.access(chosen, os.W_OK):
         raise MdfconvError(f"cannot write to {chosen}")
     return chosen

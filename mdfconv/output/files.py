@@ -29,6 +29,14 @@ def is_stream(path: Path) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
+def create_folder(folder: Path) -> None:
+    """Create a folder if it is not there, in one that is; raise `MdfconvError` if it cannot be."""
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise MdfconvError(f"cannot create {folder}: {error.strerror}") from None
+
+
 def write_files(
     contents: Mapping[Path, bytes],
     *,

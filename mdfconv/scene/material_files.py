@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mdfconv.errors import MdfconvError
-from mdfconv.output.files import write_files
+from mdfconv.output.files import create_folder, write_files
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def choose_outputs(
     files : sequence of Path
         The files.
     output : str or None
-        A file for one of them, or a folder, which exists.
+        A file for one of them, or a folder, which exists or is named with a slash at its end.
     in_place : bool
         Write over the file itself and keep the original beside it.
 
@@ -76,11 +76,13 @@ def choose_outputs(
         real = dict.fromkeys(file.resolve() for file in files)
         return [Destination(file, file, _free_backup(file)) for file in real]
     path = Path(output)
+    if output.endswith(("/", os.sep)):
+        create_folder(path)
     if path.is_dir():
         destinations = [Destination(file, path / file.name) for file in files]
     elif len(files) > 1:
         raise MdfconvError(f"{len(files)} files need a folder: {output} is not one")
-    elif output.endswith(("/", os.sep)) or output == "-":
+    elif output == "-":
         raise MdfconvError(f"cannot write {output}: it is not a file or an existing folder")
     else:
         destinations = [Destination(files[0], path)]

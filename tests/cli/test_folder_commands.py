@@ -10,7 +10,7 @@ from tests.cli.runner import run
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("plot-error", "--output", "missing"), "not an existing directory"),
+        (("plot-error", "--output", "missing/folder"), "cannot create missing/folder"),
         (("plot-error", "--mdf", "gx"), "did you mean ggx"),
         (("plot-error", "--reference", "smoothie"), "give --m-b"),
         (("plot-error", "--m-b", "-1"), "m_B > 0"),
@@ -22,7 +22,7 @@ from tests.cli.runner import run
         (("plot-error", "--mdf", "beckmann"), "is the reference"),
         (("plot-error", "--points", "100000000000"), "from 2 to"),
         (("konvert",), "did you mean convert"),
-        (("compare", "--output", "missing"), "not an existing directory"),
+        (("compare", "--output", "missing/folder"), "cannot create missing/folder"),
         (("compare", "--size", "0"), "16 to 4096"),
         (("compare", "--dpi", "-5"), "--dpi"),
         (("compare", "--exposure", "0"), "exposure"),

@@ -223,6 +223,29 @@ def test_command(tmp_path):
     assert fbx["roughness"] == pytest.approx(0.0198, abs=1e-4)
 
 
+def test_a_folder_named_as_one_is_created(tmp_path):
+    (tmp_path / "a.mtl").write_bytes(SOURCE)
+    assert run("mtl", "a.mtl", "-o", "new/", cwd=tmp_path)[0] == 0
+    assert (tmp_path / "new" / "a.mtl").read_bytes() == CONVERTED
+
+
+def test_in_place_twice_at_once_loses_nothing(tmp_path, monkeypatch):
+    """The second finds the library changed, or its name for the backup taken."""
+    library = tmp_path / "a.mtl"
+    library.write_bytes(SOURCE)
+    both = [choose_outputs([library], None, in_place=True)[0] for _ in range(2)]
+    conversion = convert_mtl(SOURCE)
+    write_conversions([(both[0], SOURCE, conversion)])
+    with pytest.raises(mdfconv.MdfconvError, match="it has changed since it was read"):
+        write_conversions([(both[1], SOURCE, conversion)])
+    library.write_bytes(SOURCE)
+    with pytest.raises(mdfconv.MdfconvError, match=r"will not write .*a.mtl.bak: it exists"):
+        write_conversions([(both[1], SOURCE, conversion)])
+    assert library.read_bytes() == SOURCE
+    assert (tmp_path / "a.mtl.bak").read_bytes() == SOURCE
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mtl", "a.mtl.bak"]
+
+
 def test_in_place_keeps_the_original(tmp_path):
     for name in ("a.mtl", "b.mtl"):
         (tmp_path / name).write_bytes(SOURCE)
@@ -260,7 +283,7 @@ def test_a_bad_statement_turns_the_status_to_1(tmp_path):
         (["*.none", "-o", "x.mtl"], "cannot read *.none"),
         (["sub", "-o", "x.mtl"], "cannot read sub: Is a directory"),
         (["a.mtl", "-o", "none/x.mtl"], "cannot write none/x.mtl"),
-        (["a.mtl", "-o", "none/"], "not a file or an existing folder"),
+        (["a.mtl", "-o", "none/none/"], "cannot create none/none"),
         (["a.mtl", "-o", "-"], "not a file or an existing folder"),
         (["a.mtl", "-o", "x.mtl", "--to", "glossiness"], "not to 'glossiness'"),
         (["a.mtl", "-o", "x.mtl", "--metric", "lihgt"], "unknown metric"),

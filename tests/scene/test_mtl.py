@@ -14,6 +14,7 @@ from PIL import Image
 import mdfconv
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.scene import convert_mtl
+from mdfconv.scene.material_files import choose_outputs, write_conversions
 from mdfconv.scene.shininess import (
     IMPORTERS,
     error_of,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from mdfconv.errors import MdfconvError
 from mdfconv.scene.texture import convert_texture_file
 from mdfconv.scene.texture_rule import TextureRule
 
@@ -36,5 +37,13 @@ def convert_texture_bytes(
     with TemporaryDirectory() as folder:
         source, target = (Path(folder) / f"{name}{suffix}" for name in ("texture", "converted"))
         source.write_bytes(data)
-        convert_texture_file(source, target, rule, channel=channel)
+        try:
+            convert_texture_file(source, target, rule, channel=channel)
+        except MdfconvError as error:
+            # The temporary file's name says nothing.
+            reason, hint = (
+                text.replace(str(source), "the texture").replace(str(target), "the result")
+                for text in (error.reason, error.hint)
+            )
+            raise MdfconvError(reason, hint, argument=error.argument) from None
         return target.read_bytes()

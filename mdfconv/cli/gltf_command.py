@@ -64,6 +64,10 @@ def command(
             "--textures", help="Convert roughness textures, too, each with the factor before it."
         ),
     ] = False,
+    lossy: Annotated[
+        bool,
+        typer.Option("--lossy", help="Take JPEG textures, although altered; they become PNG."),
+    ] = False,
     guess: Annotated[
         bool,
         typer.Option(
@@ -111,6 +115,7 @@ def command(
         specular=specular,
         in_place=in_place,
         textures=textures,
+        lossy=lossy,
         compare=compare,
         form=format_,
     )
@@ -126,13 +131,14 @@ def _convert(
     specular: float | None,
     in_place: bool,
     textures: bool,
+    lossy: bool,
     compare: bool,
     form: ReportFormat,
 ) -> None:
     from mdfconv.conversion.endpoint import with_specular
-    from mdfconv.scene.gltf import HAS_TEXTURE, convert_gltf
+    from mdfconv.scene.gltf import convert_gltf
     from mdfconv.scene.gltf_factors import factor_endpoints
-    from mdfconv.scene.gltf_images import TextureFolders
+    from mdfconv.scene.gltf_images import GltfTextures
     from mdfconv.scene.shininess import ROUGHNESS, SHININESS
 
     names = with_specular(source, target or ROUGHNESS, specular)
@@ -142,14 +148,11 @@ def _convert(
         raise MdfconvError(f"--compare is about exponents, {ends[0].label} stores none")
 
     def convert(destination: Destination, data: bytes) -> GltfConversion:
-        folders = TextureFolders(destination.source.parent, destination.output.parent)
+        folders = GltfTextures(destination.source.parent, destination.output.parent, lossy)
         chosen = folders if textures else None
         with about(destination.source):
             conversion = convert_gltf(data, *ends, metric=metric, textures=chosen)
-        problems = [
-            (place, f"{text}: --textures converts it" if text == HAS_TEXTURE else text)
-            for place, text in conversion.problems
-        ]
+        problems = [(place, _with_option(text)) for place, text in conversion.problems]
         return dataclasses.replace(conversion, problems=tuple(problems))
 
     convert_files(
@@ -159,6 +162,16 @@ def _convert(
         convert=convert,
         report=lambda converted: _report(converted, metric, names, form=form, compare=compare),
     )
+
+
+def _with_option(problem: str) -> str:
+    """Return what is wrong with a material, with the option that helps."""
+    from mdfconv.scene.gltf import HAS_TEXTURE
+    from mdfconv.scene.image_picture import ACCEPT_LOSSES
+
+    if problem == HAS_TEXTURE:
+        return f"{problem}: --textures converts it"
+    return f"{problem} (--lossy)" if problem.endswith(ACCEPT_LOSSES) else problem
 
 
 def _propose(files: list[str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import isclose
 from operator import attrgetter
 from typing import Any
 
@@ -16,12 +17,14 @@ from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.gltf_container import read_container
 from mdfconv.scene.gltf_document import FACTOR, PBR, GltfDocument, read_document
 from mdfconv.scene.gltf_factors import convert_factors, factor_endpoints
-from mdfconv.scene.gltf_textures import TextureChanges, TextureFolders, convert_textures
+from mdfconv.scene.gltf_images import GltfTextures
+from mdfconv.scene.gltf_textures import TextureChanges, convert_textures
 from mdfconv.scene.material_files import FileConversion
 from mdfconv.scene.shininess import ROUGHNESS
 
 # Digits enough that an exponent comes back from a roughness to six.
 _DIGITS = 8
+_SAME = 0.5e-8
 # What is wrong with a material whose texture is not to be converted.
 HAS_TEXTURE = "has a roughness texture"
 
@@ -76,7 +79,7 @@ def convert_gltf(
     target: str | Endpoint = ROUGHNESS,
     *,
     metric: str | Metric = "environment",
-    textures: TextureFolders | None = None,
+    textures: GltfTextures | None = None,
 ) -> GltfConversion:
     """Convert the roughness of all materials of a glTF 2.0 file.
 
@@ -90,7 +93,7 @@ def convert_gltf(
         defines ``"ggx:roughness"``, α = r².
     metric : str or Metric
         What the fit keeps.
-    textures : TextureFolders, optional
+    textures : GltfTextures, optional
         Where the file's textures are, if they are to be converted; materials with a texture of
         roughness are left as they are without.
 
@@ -115,8 +118,8 @@ def convert_gltf(
     else:
         changes = TextureChanges(problems=dict.fromkeys(textured, HAS_TEXTURE))
     materials = [
-        GltfMaterial(document.name(at), at, factors[at], 1.0, np.nan, np.nan, (note,))
-        for at, note in changes.notes.items()
+        GltfMaterial(document.name(at), at, factors[at], 1.0, np.nan, np.nan, notes)
+        for at, notes in changes.notes.items()
     ]
     plain = {at: factor for at, factor in factors.items() if at not in textured}
     converted, left = _converted(document, plain, ends, kept)
@@ -185,13 +188,14 @@ def _converted(
 
 
 def _texts(materials: Sequence[GltfMaterial]) -> dict[int, str]:
-    """Return the factors that are others in the digits that are written, by their places."""
-    texts: dict[tuple[float, float], str] = {}
-    for pair in {(material.value, material.result) for material in materials}:
-        old, new = (f"{value:.{_DIGITS}g}" for value in pair)
-        texts[pair] = new if new != old else ""
-    by_place = {entry.index: texts[entry.value, entry.result] for entry in materials}
-    return {at: text for at, text in by_place.items() if text}
+    """Return the factors that differ in the digits that are written, by their places."""
+    changed = {
+        entry.index: entry.result
+        for entry in materials
+        if not isclose(entry.value, entry.result, rel_tol=_SAME)
+    }
+    texts = {result: f"{result:.{_DIGITS}g}" for result in set(changed.values())}
+    return {at: texts[result] for at, result in changed.items()}
 
 
 def generator_of(data: bytes) -> str:

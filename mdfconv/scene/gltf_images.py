@@ -22,12 +22,12 @@ _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 _DATA = re.compile(r"data:([^,]*),", re.IGNORECASE)
 _SIGNATURES = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg"}
 _UNSAFE = re.compile(r"[^\w.-]+")
-_PNG = "data:image/png;base64,"
+_MIME = "image/png"
 
 
 @dataclass(frozen=True)
-class TextureFolders:
-    """Where the textures of a file are.
+class GltfTextures:
+    """Where the textures of a file are, and which are taken.
 
     Parameters
     ----------
@@ -35,10 +35,13 @@ class TextureFolders:
         The folder that relative addresses start from: that of the file.
     output : Path
         The folder of the result, for new files beside it.
+    lossy : bool
+        Whether to take a JPEG, although it has altered the values; it becomes a PNG.
     """
 
     source: Path
     output: Path
+    lossy: bool = False
 
 
 def index_of(value: Any, entries: list[Any], what: str) -> int:
@@ -71,14 +74,14 @@ class GltfImages:
         The JSON, which is changed.
     container : Container
         The file.
-    folders : TextureFolders
+    folders : GltfTextures
         Where other files are.
     ending : str
         What the names of new files end in, before the suffix.
     """
 
     def __init__(
-        self, document: GltfDocument, container: Container, folders: TextureFolders, ending: str
+        self, document: GltfDocument, container: Container, folders: GltfTextures, ending: str
     ) -> None:
         self._document, self._container = document, container
         self._folders, self._ending = folders, ending
@@ -101,7 +104,7 @@ class GltfImages:
         """
         entry = self.images[image].value
         if ("uri" in entry) == ("bufferView" in entry):
-            raise MdfconvError(f"images[{image}] has not one of uri and bufferView")
+            raise MdfconvError("has not one of uri and bufferView")
         if "uri" in entry:
             content = self._from_uri(entry["uri"])
         else:
@@ -109,21 +112,17 @@ class GltfImages:
         for signature, suffix in _SIGNATURES.items():
             if content.startswith(signature):
                 return content, suffix
-        raise MdfconvError(f"images[{image}] is no PNG")
+        raise MdfconvError("is neither PNG nor JPEG")
 
     def replace(self, image: int, content: bytes) -> None:
         """Put another PNG in the place of an image, for all that use it."""
-        entry = self.images[image].value
-        if (
-            "uri" not in entry
-            and self._in_binary(entry)
-            and self._views_used.count(entry["bufferView"]) == 1
-        ):
-            view = self._views[int(entry["bufferView"])]
-            self._document.json.set_members(view.start, self._append(content))
+        entry, text = self.images[image].value, self._document.json
+        alone = "uri" not in entry and self._views_used.count(entry["bufferView"]) == 1
+        if alone and self._in_binary(entry):
+            text.set_members(self._views[int(entry["bufferView"])].start, self._append(content))
+            text.set_members(self.images[image].start, _kind(entry))
         else:
-            values, renamed = self._placed(image, content)
-            self._document.json.set_members(self.images[image].start, values, renamed)
+            text.set_members(self.images[image].start, *self._placed(image, content))
 
     def add(self, image: int, content: bytes) -> int:
         """Add an image that is like another one but for its content; return its index."""
@@ -163,21 +162,22 @@ class GltfImages:
         entry = self.images[image].value
         if "uri" in entry:
             inside = bool(_DATA.match(entry["uri"]))
-            return {"uri": self._stored(image, content, inside=inside)}, {}
+            return {"uri": self._stored(image, content, inside=inside)} | _kind(entry), {}
         if self._in_binary(entry):
             members = {"buffer": "0"} | self._append(content)
             pairs = ", ".join(f'"{name}": {value}' for name, value in members.items())
             self._new_views.append(f"{{{pairs}}}")
-            return {"bufferView": str(len(self._views) + len(self._new_views) - 1)}, {}
+            view = len(self._views) + len(self._new_views) - 1
+            return {"bufferView": str(view)} | _kind(entry), {}
         buffer = self._buffers[int(self._views[int(entry["bufferView"])].value["buffer"])].value
         inside = bool(_DATA.match(buffer["uri"]))
         uri = self._stored(image, content, inside=inside)
-        return {"bufferView": uri}, {"bufferView": "uri"}
+        return {"bufferView": uri} | _kind(entry), {"bufferView": "uri"}
 
     def _stored(self, image: int, content: bytes, *, inside: bool) -> str:
         """Return an address in JSON at which content is: within the file, or in a new one."""
         if inside:
-            return json.dumps(_PNG + base64.b64encode(content).decode())
+            return json.dumps(f"data:{_MIME};base64,{base64.b64encode(content).decode()}")
         entry = self.images[image].value
         stem = Path(unquote(entry["uri"])).stem if "uri" in entry else entry.get("name")
         stem = _UNSAFE.sub("_", stem) if isinstance(stem, str) and stem else f"image{image}"
@@ -223,6 +223,11 @@ class GltfImages:
         if not 0 <= offset <= offset + length <= len(content):
             raise MdfconvError(f"bufferViews[{at}] is not within its buffer")
         return bytes(content[int(offset) : int(offset + length)])
+
+
+def _kind(entry: dict[str, Any]) -> dict[str, str]:
+    """Return what to set for an image that says to be no PNG."""
+    return {"mimeType": f'"{_MIME}"'} if entry.get("mimeType", _MIME) != _MIME else {}
 
 
 def _check_free(path: Path) -> None:

@@ -17,12 +17,10 @@ from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
 from mdfconv.scene.gltf_container import Container
 from mdfconv.scene.gltf_document import FACTOR, GltfDocument, walk
-from mdfconv.scene.gltf_images import GltfImages, TextureFolders, index_of, is_count
+from mdfconv.scene.gltf_images import GltfImages, GltfTextures, index_of, is_count
 from mdfconv.scene.json_edit import JsonText, Place
-from mdfconv.scene.texture_bytes import convert_texture_bytes
+from mdfconv.scene.texture_bytes import converted_and_report
 from mdfconv.scene.texture_rule import TextureRule
-
-__all__ = ["TextureChanges", "TextureFolders", "convert_textures"]
 
 _CHANNEL = "g"
 _OCCLUSION = "occlusionTexture"
@@ -35,16 +33,16 @@ class TextureChanges:
 
     Parameters
     ----------
-    notes, problems : dict of int to str
-        By the places of materials: what is said of those that were converted, and why the others
-        are left as they are.
+    notes, problems : dict
+        By the places of materials: what a careful user must know of those that were converted,
+        and why the others are left as they are.
     files : dict
         New files.
     appended : bytes
         What is added to the binary chunk.
     """
 
-    notes: dict[int, str] = field(default_factory=dict)
+    notes: dict[int, tuple[str, ...]] = field(default_factory=dict)
     problems: dict[int, str] = field(default_factory=dict)
     files: dict[Path, bytes] = field(default_factory=dict)
     appended: bytes = b""
@@ -56,7 +54,7 @@ def convert_textures(
     wanted: Mapping[int, float],
     ends: tuple[Endpoint, Endpoint],
     metric: Metric,
-    folders: TextureFolders,
+    folders: GltfTextures,
 ) -> TextureChanges:
     """Convert the roughness textures of materials, each with the factor before it.
 
@@ -75,7 +73,7 @@ def convert_textures(
         What effective roughness is, and what it becomes.
     metric : Metric
         What the fit keeps.
-    folders : TextureFolders
+    folders : GltfTextures
         Where files are.
     """
     changes = TextureChanges()
@@ -90,12 +88,21 @@ def convert_textures(
         except MdfconvError as error:
             changes.problems[at] = str(error)
     contents: dict[tuple[int, float], bytes] = {}
+    notes: dict[tuple[int, float], list[str]] = {}
     for (image, factor), materials in versions.items():
         try:
-            contents[image, factor] = _converted(images, image, factor, ends, metric)
+            rule = _rule(factor, ends, metric)
+            content, suffix = images.read(image)
+            contents[image, factor], report = converted_and_report(
+                content, suffix, rule, _CHANNEL, lossy=folders.lossy
+            )
+            notes[image, factor] = report.notes()
         except MdfconvError as error:
-            changes.problems |= dict.fromkeys(materials, str(error))
+            changes.problems |= dict.fromkeys(materials, f"images[{image}]: {error}")
     _write(document, textures, images, versions, contents, named, changes)
+    for version, texts in notes.items():
+        for at in changes.notes.keys() & versions[version]:
+            changes.notes[at] += tuple(texts)
     changes.files, changes.appended = images.files, images.appended
     return changes
 
@@ -114,22 +121,11 @@ def _image(textures: list[Place], at: int, images: GltfImages) -> int:
     return index_of(texture.get("source"), images.images, "image")
 
 
-def _converted(
-    images: GltfImages,
-    image: int,
-    factor: float,
-    ends: tuple[Endpoint, Endpoint],
-    metric: Metric,
-) -> bytes:
-    """Return an image with its green channel converted."""
-    content, suffix = images.read(image)
+def _rule(factor: float, ends: tuple[Endpoint, Endpoint], metric: Metric) -> TextureRule:
+    """Return how texels with a factor before them are converted."""
     source = ends[0] if factor == 1 else scaled(ends[0], factor)
     _check_ends(source, factor)
-    rule = TextureRule(source, ends[1], metric=str(metric))
-    try:
-        return convert_texture_bytes(content, suffix, rule, _CHANNEL)
-    except MdfconvError as error:
-        raise MdfconvError(f"images[{image}]: {error}") from None
+    return TextureRule(source, ends[1], metric=str(metric))
 
 
 def _check_ends(source: Endpoint, factor: float) -> None:
@@ -201,7 +197,7 @@ def _write(
         except MdfconvError as error:
             changes.problems |= dict.fromkeys(materials, str(error))
             continue
-        changes.notes |= dict.fromkeys(materials, f"with the texture of images[{image}]")
+        changes.notes |= dict.fromkeys(materials, (f"with the texture of images[{image}]",))
     document.append("textures", new_textures)
     images.finish()
 

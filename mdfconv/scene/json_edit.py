@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 from mdfconv.errors import MdfconvError
@@ -191,7 +192,7 @@ class JsonText:
     def changed(self) -> str:
         """Return the text with all changes."""
         pieces, position = [], 0
-        for start, end, new in sorted(self._edits, key=lambda edit: edit[:2]):
+        for start, end, new in sorted(self._edits, key=itemgetter(0, 1)):
             pieces += [self._text[position:start], new]
             position = end
         return "".join([*pieces, self._text[position:]])

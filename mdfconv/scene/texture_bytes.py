@@ -7,6 +7,7 @@ from tempfile import TemporaryDirectory
 
 from mdfconv.errors import MdfconvError
 from mdfconv.scene.texture import convert_texture_file
+from mdfconv.scene.texture_map import TextureReport
 from mdfconv.scene.texture_rule import TextureRule
 
 
@@ -34,11 +35,22 @@ def convert_texture_bytes(
     MdfconvError
         As `convert_texture_file`.
     """
+    return converted_and_report(data, suffix, rule, channel)[0]
+
+
+def converted_and_report(
+    data: bytes, suffix: str, rule: TextureRule, channel: str | None = None, *, lossy: bool = False
+) -> tuple[bytes, TextureReport]:
+    """Convert the content of a picture file as `convert_texture_bytes`, and say what was done.
+
+    With `lossy` a JPEG is taken, too, and becomes a PNG.
+    """
     with TemporaryDirectory() as folder:
-        source, target = (Path(folder) / f"{name}{suffix}" for name in ("texture", "converted"))
+        source = Path(folder) / f"texture{suffix}"
+        target = Path(folder) / f"converted{'.png' if lossy else suffix}"
         source.write_bytes(data)
         try:
-            convert_texture_file(source, target, rule, channel=channel)
+            report = convert_texture_file(source, target, rule, channel=channel, lossy=lossy)
         except MdfconvError as error:
             # The temporary file's name says nothing.
             reason, hint = (
@@ -46,4 +58,4 @@ def convert_texture_bytes(
                 for text in (error.reason, error.hint)
             )
             raise MdfconvError(reason, hint, argument=error.argument) from None
-        return target.read_bytes()
+        return target.read_bytes(), report

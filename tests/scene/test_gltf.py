@@ -16,7 +16,7 @@ from PIL import Image
 
 import mdfconv
 from mdfconv.errors import MdfconvError
-from mdfconv.scene import TextureFolders, convert_gltf
+from mdfconv.scene import GltfTextures, convert_gltf
 from mdfconv.scene.gltf import dialects_by_generator, generator_of
 from tests.cli.runner import run, run_on_terminal
 
@@ -234,7 +234,7 @@ def test_errors_of_many_values_are_read_from_a_curve():
     many = convert_gltf(text_of(*map(factor, values)), "blinn-phong:peak").materials
     for entry in many[::250]:
         (alone,) = convert_gltf(text_of(factor(entry.value)), "blinn-phong:peak").materials
-        assert entry.rmse == pytest.approx(alone.rmse, rel=1e-3)
+        assert entry.rmse == pytest.approx(alone.rmse, rel=5e-3)
         assert entry.result == pytest.approx(alone.result, rel=1e-9)
 
 
@@ -405,7 +405,7 @@ def test_a_texture_in_a_file(tmp_path):
         textures=[{"source": 0}, {"source": 0, "sampler": 0}],
         images=[{"uri": "maps/wood%201.png", "name": "w"}],
     )
-    found = convert_gltf(data, OBJ2GLTF, textures=TextureFolders(source, output))
+    found = convert_gltf(data, OBJ2GLTF, textures=GltfTextures(source, output))
     assert not found.problems
     ((path, content),) = found.files.items()
     assert path == output / "wood_1_ggx-roughness.png"
@@ -414,7 +414,7 @@ def test_a_texture_in_a_file(tmp_path):
     assert [entry.notes for entry in found.materials] == [("with the texture of images[0]",)] * 2
     # What is there is not written over.
     path.write_bytes(b"")
-    found = convert_gltf(data, OBJ2GLTF, textures=TextureFolders(source, output))
+    found = convert_gltf(data, OBJ2GLTF, textures=GltfTextures(source, output))
     assert [place for place, _ in found.problems] == ["materials[0]", "materials[1]"]
     assert (found.data, found.files) == (data, {})
 
@@ -431,7 +431,7 @@ def test_textures_with_factors_and_other_uses(tmp_path):
         textures=[{"source": 0}, {"source": 1, "sampler": 0}, {"source": 2}],
         images=[{"uri": data_uri(content)} for content in contents],
     )
-    folders = TextureFolders(tmp_path, tmp_path)
+    folders = GltfTextures(tmp_path, tmp_path)
     found = convert_gltf(data, OBJ2GLTF, textures=folders)
     assert not found.problems
     after = json.loads(found.data)
@@ -467,7 +467,7 @@ def test_a_texture_in_the_binary_chunk(shared, tmp_path):
         binary,
         (b"XTRA", b"more"),
     )
-    found = convert_gltf(data, OBJ2GLTF, textures=TextureFolders(tmp_path, tmp_path))
+    found = convert_gltf(data, OBJ2GLTF, textures=GltfTextures(tmp_path, tmp_path))
     assert not found.problems
     (_, text), (_, chunk), extra = chunks_of(found.data)
     assert extra == (b"XTRA", b"more")
@@ -498,7 +498,7 @@ def test_a_texture_in_another_buffer(inside, tmp_path):
         bufferViews=[{"buffer": 0, "byteOffset": 3, "byteLength": len(content)}],
         buffers=[{"byteLength": 3 + len(content), "uri": uri}],
     )
-    found = convert_gltf(data, OBJ2GLTF, textures=TextureFolders(tmp_path, tmp_path))
+    found = convert_gltf(data, OBJ2GLTF, textures=GltfTextures(tmp_path, tmp_path))
     assert not found.problems
     (image,) = json.loads(found.data)["images"]
     assert {key: image[key] for key in image if key != "uri"} == {
@@ -518,8 +518,8 @@ def test_a_texture_in_another_buffer(inside, tmp_path):
         ({"uri": "none.png"}, 0, "No such file"),
         ({"uri": "https://example.org/a.png"}, 0, "which is no file beside it"),
         ({"uri": "data:image/png;base64,!"}, 0, "no base64"),
-        ({"uri": "data:image/png;base64,aaaa"}, 0, "is no PNG"),
-        ({"uri": "data:,abc"}, 0, "is no PNG"),
+        ({"uri": "data:image/png;base64,aaaa"}, 0, "is neither PNG nor JPEG"),
+        ({"uri": "data:,abc"}, 0, "is neither PNG nor JPEG"),
         ({"uri": data_uri(png()[:60])}, 0, "images[0]: the texture is damaged"),
         ({"uri": data_uri(png(mode="P"))}, 0, "has a palette"),
         ({"uri": data_uri(png(mode="L"))}, 0, "has no channel 'g'"),
@@ -551,7 +551,7 @@ def test_textures_that_are_left(image, texture, text, tmp_path):
         ],
         buffers=[{"byteLength": 3, "uri": "data:;base64,YWJj"}, {"byteLength": 3}],
     )
-    found = convert_gltf(data, OBJ2GLTF, textures=TextureFolders(tmp_path, tmp_path))
+    found = convert_gltf(data, OBJ2GLTF, textures=GltfTextures(tmp_path, tmp_path))
     ((place, problem),) = found.problems
     assert place == "materials[0]"
     assert text in problem
@@ -560,14 +560,14 @@ def test_textures_that_are_left(image, texture, text, tmp_path):
 
 def test_a_factor_of_0_makes_its_texture_no_matter(tmp_path):
     data = text_of(textured(0, 0))
-    found = convert_gltf(data, "blinn-phong:peak", textures=TextureFolders(tmp_path, tmp_path))
+    found = convert_gltf(data, "blinn-phong:peak", textures=GltfTextures(tmp_path, tmp_path))
     assert not found.problems
     assert found.data == data
 
 
 def test_factors_below_what_a_program_stores_leave_their_textures(tmp_path):
     data = text_of(textured(0, 0.15), textures=[{"source": 0}], images=[{"uri": data_uri(png())}])
-    found = convert_gltf(data, "blinn-phong:babylon", textures=TextureFolders(tmp_path, tmp_path))
+    found = convert_gltf(data, "blinn-phong:babylon", textures=GltfTextures(tmp_path, tmp_path))
     assert "out of range" in found.problems[0][1]
     assert found.data == data
 
@@ -693,3 +693,50 @@ def test_the_table_fits_a_terminal(tmp_path):
     assert "0.331488" in text
     table = [line for line in text.splitlines() if "│" in line or "─" in line or "0.33" in line]
     assert max(map(len, table)) <= 80
+
+
+def test_a_jpeg_is_taken_if_its_losses_are_accepted(tmp_path):
+    content = io.BytesIO()
+    Image.open(io.BytesIO(png(3))).save(content, "jpeg")
+    jpeg = content.getvalue()
+    images = [
+        {"bufferView": 0, "mimeType": "image/jpeg"},
+        {"uri": "a.jpg"},
+        {"uri": "data:image/jpeg;base64," + base64.b64encode(jpeg).decode()},
+    ]
+    (tmp_path / "a.jpg").write_bytes(jpeg)
+    document = text_of(
+        *(textured(at) for at in range(3)),
+        textures=[{"source": at} for at in range(3)],
+        images=images,
+        bufferViews=[{"buffer": 0, "byteLength": len(jpeg)}],
+        buffers=[{"byteLength": len(jpeg)}],
+    )
+    (tmp_path / "a.glb").write_bytes(glb(document, jpeg))
+    words = "gltf", "a.glb", "--from", OBJ2GLTF, "--textures", "-o"
+    status, _, err = run(*words, "b.glb", cwd=tmp_path)
+    assert status == 1
+    assert err.count("accept the losses (--lossy): left as it is") == 3
+    status, _, err = run(*words, "c.glb", "--lossy", cwd=tmp_path)
+    assert status == 0, err
+    text, binary = (data for _, data in chunks_of((tmp_path / "c.glb").read_bytes()))
+    after = json.loads(text)
+    view = after["bufferViews"][0]
+    assert after["images"][0] == {"bufferView": 0, "mimeType": "image/png"}
+    assert after["images"][1] == {"uri": "a_ggx-roughness.png"}
+    results = [
+        binary[view["byteOffset"] :][: view["byteLength"]],
+        (tmp_path / "a_ggx-roughness.png").read_bytes(),
+        content_of(after["images"][2]),
+    ]
+    for result in results:
+        check_texels(jpeg, result)
+
+
+def test_texels_that_are_mirrors_are_told(tmp_path):
+    black = io.BytesIO()
+    Image.new("RGB", (4, 2)).save(black, "png")
+    images = [{"uri": data_uri(black.getvalue())}]
+    data = text_of(textured(0, 0.5), textures=[{"source": 0}], images=images)
+    found = convert_gltf(data, OBJ2GLTF, textures=GltfTextures(tmp_path, tmp_path))
+    assert "8 of 8 texels are perfect mirrors" in found.materials[0].notes[1]

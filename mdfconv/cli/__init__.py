@@ -23,6 +23,7 @@ _COMMANDS = (
     "convert",
     "formula",
     "mtl",
+    "gltf",
     "texture",
     "light",
     "list",

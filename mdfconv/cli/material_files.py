@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from mdfconv.cli.tables import tell
+from mdfconv.cli.tables import ROWS_SHOWN, print_table, rich_table, tell, tell_rest
+from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
+    from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.material_files import Destination, FileConversion
 
     Conversion = TypeVar("Conversion", bound=FileConversion)
 else:
     Conversion = TypeVar("Conversion")
+
+
+# Two milliseconds a row: of a hundred thousand materials the report is not to take the time.
+MATERIALS_SHOWN = 100
 
 
 class ReportFormat(StrEnum):
@@ -100,3 +108,71 @@ def convert_files(
 def number_cell(value: float, digits: int) -> str:
     """Return a number as the tables of these commands show it."""
     return "—" if math.isnan(value) else f"{value:.{digits}g}"
+
+
+@contextmanager
+def about(path: Path) -> Iterator[None]:
+    """Put the name of a file before what is wrong with it."""
+    try:
+        yield
+    except MdfconvError as error:
+        raise MdfconvError(f"{path} {error.reason}", error.hint, argument=error.argument) from None
+
+
+def print_materials(
+    file: str, rows: Sequence[dict[str, str]], title: str, right: Sequence[str], count: int
+) -> None:
+    """Print a table of what was converted to standard error.
+
+    Parameters
+    ----------
+    file : str
+        The file.
+    rows : sequence of dict
+        The cells of the first `MATERIALS_SHOWN` materials, by headings.
+    title : str
+        What stands above the table.
+    right : sequence of str
+        The headings of numbers.
+    count : int
+        How many materials there are.
+    """
+    if rows:
+        print_table(rich_table(list(rows[0]), rows, title, right=right), err=True)
+    else:
+        typer.echo(f"{file}: nothing to convert", err=True)
+    tell_rest(count, "--format json", MATERIALS_SHOWN)
+
+
+def importer_rows(rows: list[dict[str, Any]], exponents: Sequence[float], metric: Metric) -> None:
+    """Add to the rows of materials what importers make of their exponents, if they have some."""
+    import numpy as np
+
+    from mdfconv.scene.shininess import importer_results
+
+    known = [number for number, exponent in enumerate(exponents) if math.isfinite(exponent)]
+    results = importer_results(np.array([exponents[number] for number in known]), metric)
+    for row in rows:
+        row["importers"] = {}
+    for number, result in zip(known, results, strict=True):
+        rows[number]["importers"] = {
+            r.importer: {"roughness": r.roughness, "rmse": r.rmse} for r in result
+        }
+
+
+def print_importers(materials: Sequence[dict[str, Any]]) -> None:
+    """Print what importers make of each material to standard error."""
+    rows = [
+        {
+            "material": row["name"],
+            "importer": name,
+            "roughness": number_cell(result["roughness"], 3),
+            "RMSE": "a mirror" if math.isinf(result["rmse"]) else number_cell(result["rmse"], 3),
+        }
+        for row in materials
+        for name, result in row["importers"].items()
+    ]
+    if rows:
+        table = rich_table(list(rows[0]), rows[:ROWS_SHOWN], "Importers", right=list(rows[0])[2:])
+        print_table(table, err=True)
+        tell_rest(len(rows), "--format json")

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mdfconv.cli.material_files import (
+    MATERIALS_SHOWN,
     InPlaceOption,
     ReportFormat,
     ReportFormatOption,
     ResultOption,
     convert_files,
+    importer_rows,
     number_cell,
+    print_importers,
+    print_materials,
 )
 from mdfconv.cli.options import ExposureOption, MetricOption, chosen_metric
-from mdfconv.cli.tables import ROWS_SHOWN, print_table, progress, rich_table, tell_rest
+from mdfconv.cli.tables import progress
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import json_text
 
@@ -124,7 +127,7 @@ def _report(
     form: ReportFormat,
     compare: bool,
 ) -> None:
-    records = [
+    records: list[dict[str, Any]] = [
         {
             "file": str(destination.source),
             "output": str(destination.output),
@@ -141,7 +144,7 @@ def _report(
     for record in records:
         _print_table(record)
         if compare:
-            _print_importers(record)
+            print_importers(record["materials"])
 
 
 def _rows(
@@ -151,15 +154,7 @@ def _rows(
         vars(material) | {"notes": list(material.notes)} for material in materials
     ]
     if compare:
-        import numpy as np
-
-        from mdfconv.scene.shininess import importer_results
-
-        exponents = np.array([material.shininess for material in materials])
-        for row, results in zip(rows, importer_results(exponents, metric), strict=True):
-            row["importers"] = {
-                r.importer: {"roughness": r.roughness, "rmse": r.rmse} for r in results
-            }
+        importer_rows(rows, [material.shininess for material in materials], metric)
     return rows
 
 
@@ -174,32 +169,9 @@ def _print_table(record: dict[str, Any]) -> None:
             "RMSE": number_cell(row["rmse"], 3),
             "notes": "; ".join(row["notes"]),
         }
-        for row in rows[:ROWS_SHOWN]
+        for row in rows[:MATERIALS_SHOWN]
     ]
-    if shown:
-        title = f"{record['file']}, {record['metric']} metric"
-        right = ["Ns", "Pr", "RMSE"]
-        print_table(rich_table(list(shown[0]), shown, title, right=right), err=True)
-    else:
-        typer.echo(f"{record['file']}: nothing to convert", err=True)
-    tell_rest(len(rows), "--format json")
+    title = f"{record['file']}, {record['metric']} metric"
+    print_materials(record["file"], shown, title, ["Ns", "Pr", "RMSE"], len(rows))
     for texture in record["textures"]:
         typer.echo(f"{texture['keyword']} {texture['file']} (line {texture['line']})", err=True)
-
-
-def _print_importers(record: dict[str, Any]) -> None:
-    """Print what importers make of each material to standard error."""
-    rows = [
-        {
-            "material": row["name"],
-            "importer": name,
-            "roughness": number_cell(result["roughness"], 3),
-            "RMSE": "a mirror" if math.isinf(result["rmse"]) else number_cell(result["rmse"], 3),
-        }
-        for row in record["materials"]
-        for name, result in row["importers"].items()
-    ]
-    if rows:
-        table = rich_table(list(rows[0]), rows[:ROWS_SHOWN], "Importers", right=list(rows[0])[2:])
-        print_table(table, err=True)
-        tell_rest(len(rows), "--format json")

@@ -135,10 +135,10 @@ def print_table(table: Any, *, err: bool = False) -> None:
     out.print(table)
 
 
-def tell_rest(count: int, everything: str = "--format csv") -> None:
+def tell_rest(count: int, everything: str = "--format csv", shown: int = ROWS_SHOWN) -> None:
     """Say how many rows a table on a terminal leaves out, and what shows them."""
-    if count > ROWS_SHOWN:
-        tell(f"… and {count - ROWS_SHOWN} more; {everything} has them all")
+    if count > shown:
+        tell(f"… and {count - shown} more; {everything} has them all")
 
 
 def console(*, err: bool = False) -> Console:

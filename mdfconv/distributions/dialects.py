@@ -70,6 +70,10 @@ class Dialect:
         What else to know.
     pairing : Pairing or None
         How it stores both axes of an anisotropic surface; None for each by itself.
+    generators : tuple of str
+        What ``asset.generator`` has, in lower case, in a glTF file with numbers of this rule.
+    provided : str
+        On what condition it has; "" for none.
     """
 
     name: str
@@ -85,6 +89,8 @@ class Dialect:
     roughness: Callable[[Array], Array] | None = field(default=None, compare=False)
     note: str = ""
     pairing: Pairing | None = None
+    generators: tuple[str, ...] = ()
+    provided: str = ""
 
     def encoding(self, parameter: Parameter, setting: str = "") -> Encoding:
         """Return it as an encoding of a parameter.
@@ -265,6 +271,8 @@ DIALECTS = (
         "blender-obj", _PHONG, "r = 1 − √(N/1000)", *_falling(1000, 2),
         "Blender, OBJ import and export", "wavefront_obj/importer/obj_import_mtl.cc",
         clamps=_TO_MIRROR, roughness=_same,
+        generators=("blender i/o", "khronos blender"),
+        provided="if its materials came from a Wavefront OBJ",
     ),
     Dialect(
         "obj2gltf", _PHONG, "r = 1 − N/1000, times 1 − L below L = 0.1",
@@ -272,11 +280,13 @@ DIALECTS = (
         lambda n, weight: np.maximum(1 - n / 1000, 0) * _obj2gltf(weight),
         "CesiumGS obj2gltf", "lib/loadMtl.js",
         clamps=_TO_MIRROR, specular=Specular.optional, roughness=_same,
+        generators=("obj2gltf",),
     ),
     Dialect(
         "assimp-gltf", _PHONG, "r = 1 − L √(N/1000)", *_falling(1000, 2),
         "assimp, glTF 2 export", "code/AssetLib/glTF2/glTF2Exporter.cpp",
         clamps=_TO_MIRROR, specular=Specular.needed, roughness=_same,
+        generators=("assimp", "open asset import library"),
     ),
     Dialect(
         "fbx", _PHONG, "r = 1 − √N/10", *_falling(100, 2),
@@ -297,6 +307,7 @@ DIALECTS = (
         "src/gltf/Raw2Gltf.cpp; libs/filamentapp/src/MeshAssimp.cpp; AssimpImporter.cpp; "
         "trimesh/exchange/dae.py",
         _ABOVE_ZERO, roughness=_same, note="α stored as roughness: one square root short",
+        generators=("fbx2gltf",),
     ),
     Dialect(
         "peak", _PHONG, "r = (2/(N+2))^¼", *_inverse_power(4),
@@ -304,6 +315,7 @@ DIALECTS = (
         "trimesh/visual/material.py; MaterialConverterSystemComponent.cpp; "
         "panda/src/gobj/material.cxx",
         _ABOVE_ZERO, roughness=_same,
+        generators=("trimesh",),
     ),
     Dialect(
         "babylon", _PHONG, "r = 0.1 + 0.9 (1 − (N/1300)^⅓)³",
@@ -317,6 +329,7 @@ DIALECTS = (
         replace(_ROUGHNESS, lower=_BABYLON_LEAST),
         clamps=(Clamp(_BABYLON_LEAST, _BABYLON_LEAST),), roughness=_same,
         note="its test: N = 64 gives 0.328809",
+        generators=("babylon",),
     ),
     Dialect(
         "vtk-gltf", _PHONG, "r = 1/(1 + 0.2 L N)",
@@ -324,11 +337,13 @@ DIALECTS = (
         lambda n, weight: 1 / (1 + 0.2 * weight * n),
         "VTK, glTF export", "IO/Export/vtkGLTFExporter.cxx",
         _ABOVE_ZERO, specular=Specular.needed, roughness=_same,
+        generators=("vtk",),
     ),
     Dialect(
         "ifcopenshell-gltf", _PHONG, "r = 1/N",
         lambda r, weight: 1 / r, lambda n, weight: 1 / n,
         "IfcOpenShell", "mapping.cpp", _ABOVE_ZERO, roughness=_same,
+        generators=("ifcopenshell",),
     ),
     Dialect(
         "mmd-tools", _PHONG, "r = 1/max(N, 1)^0.37",

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from mdfconv.errors import MdfconvError
 from mdfconv.scene.texture import convert_texture_file
+from mdfconv.scene.texture_map import TextureReport
 from mdfconv.scene.texture_rule import TextureRule
 
 
@@ -33,8 +35,27 @@ def convert_texture_bytes(
     MdfconvError
         As `convert_texture_file`.
     """
+    return converted_and_report(data, suffix, rule, channel)[0]
+
+
+def converted_and_report(
+    data: bytes, suffix: str, rule: TextureRule, channel: str | None = None, *, lossy: bool = False
+) -> tuple[bytes, TextureReport]:
+    """Convert the content of a picture file as `convert_texture_bytes`, and say what was done.
+
+    With `lossy` a JPEG is taken, too, and becomes a PNG.
+    """
     with TemporaryDirectory() as folder:
-        source, target = (Path(folder) / f"{name}{suffix}" for name in ("texture", "converted"))
+        source = Path(folder) / f"texture{suffix}"
+        target = Path(folder) / f"converted{'.png' if lossy else suffix}"
         source.write_bytes(data)
-        convert_texture_file(source, target, rule, channel=channel)
-        return target.read_bytes()
+        try:
+            report = convert_texture_file(source, target, rule, channel=channel, lossy=lossy)
+        except MdfconvError as error:
+            # The temporary file's name says nothing.
+            reason, hint = (
+                text.replace(str(source), "the texture").replace(str(target), "the result")
+                for text in (error.reason, error.hint)
+            )
+            raise MdfconvError(reason, hint, argument=error.argument) from None
+        return target.read_bytes(), report

@@ -28,7 +28,7 @@ class TextureRule:
 
     Parameters
     ----------
-    source, target : str
+    source, target : str or Endpoint
         Distribution and encoding. ``"ggx"`` and ``"ggx:alpha"`` store α itself,
         ``"ggx:roughness"`` r with α = r², ``"ggx:glossiness"`` g with α = (1−g)², and likewise
         for Beckmann; other distributions of a roughness store their parameter as it is.
@@ -50,8 +50,8 @@ class TextureRule:
         The second parameter, for source and target that have one; its default if not given.
     """
 
-    source: str
-    target: str
+    source: str | Endpoint
+    target: str | Endpoint
     method: str | None = None
     metric: str = "environment"
     exponent_max: float = EXPONENT_MAX
@@ -76,7 +76,7 @@ class TextureRule:
             )
         return endpoints(self._endpoint(self.source), self._endpoint(self.target), self.gamma)
 
-    def _endpoint(self, name: str) -> Endpoint:
+    def _endpoint(self, name: str | Endpoint) -> Endpoint:
         if not isinstance(name, str):
             return endpoint(name)  # which says what a name is
         head, colon, tail = name.partition(":")

@@ -1,0 +1,258 @@
+"""``mdfconv gltf``."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mdfconv.cli.material_files import (
+    MATERIALS_SHOWN,
+    InPlaceOption,
+    ReportFormat,
+    ReportFormatOption,
+    ResultOption,
+    about,
+    convert_files,
+    importer_rows,
+    number_cell,
+    print_importers,
+    print_materials,
+)
+from mdfconv.cli.options import ExposureOption, MetricOption, SpecularOption, chosen_metric
+from mdfconv.errors import MdfconvError
+from mdfconv.output.records import json_text
+
+if TYPE_CHECKING:
+    from mdfconv.fitting.metrics import Metric
+    from mdfconv.scene.gltf import GltfConversion, GltfMaterial
+    from mdfconv.scene.material_files import Destination
+
+
+def command(
+    files: Annotated[
+        list[str],
+        typer.Argument(metavar="IN.glb...", help="glTF or GLB files, or patterns such as '*.glb'."),
+    ],
+    output: ResultOption = None,
+    source: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="MDF:PROGRAM",
+            help="What the program that wrote the file stored, such as blinn-phong:obj2gltf "
+            "(mdfconv list --encodings has all).",
+        ),
+    ] = None,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            "--to",
+            metavar="MDF:ENCODING",
+            help="What the factors become; if not given ggx:roughness, as glTF defines them.",
+        ),
+    ] = None,
+    metric: MetricOption = "environment",
+    exposure: ExposureOption = None,
+    specular: SpecularOption = None,
+    in_place: InPlaceOption = False,
+    textures: Annotated[
+        bool,
+        typer.Option(
+            "--textures", help="Convert roughness textures, too, each with the factor before it."
+        ),
+    ] = False,
+    lossy: Annotated[
+        bool,
+        typer.Option("--lossy", help="Take JPEG textures, although altered; they become PNG."),
+    ] = False,
+    guess: Annotated[
+        bool,
+        typer.Option(
+            "--guess", help="Only propose --from by the file's asset.generator; write nothing."
+        ),
+    ] = False,
+    compare: Annotated[
+        bool,
+        typer.Option(
+            "--compare", help="Add what importers' rules make of the exponents, and their error."
+        ),
+    ] = False,
+    format_: ReportFormatOption = ReportFormat.table,
+) -> None:
+    """Repair the roughness factors of glTF 2.0 files whose writer had exponents.
+
+    glTF's roughness is that of GGX, alpha = roughness squared; many programs store a number by a
+    rule of their own instead. Replaces it by the best fit; every other byte of the JSON and the
+    binary chunk are kept. What has no answer is reported and left, and the exit status is 1.
+
+    Examples:
+
+    mdfconv gltf chair.glb --guess
+
+    mdfconv gltf chair.glb -o chair-pbr.glb --from blinn-phong:obj2gltf
+
+    mdfconv gltf --in-place --textures --from blinn-phong:peak-alpha 'assets/*.gltf'
+
+    mdfconv gltf lamp.gltf -o new.gltf --from blinn-phong:assimp-gltf --specular 0.5 --compare
+    """
+    if guess:
+        _propose(files)
+        return
+    if source is None:
+        raise MdfconvError(
+            "the rule by which the factors were stored is missing: give --from",
+            "--guess proposes one",
+        )
+    _convert(
+        files,
+        output,
+        source,
+        target,
+        chosen_metric(metric, exposure),
+        specular=specular,
+        in_place=in_place,
+        textures=textures,
+        lossy=lossy,
+        compare=compare,
+        form=format_,
+    )
+
+
+def _convert(
+    files: list[str],
+    output: str | None,
+    source: str,
+    target: str | None,
+    metric: Metric,
+    *,
+    specular: float | None,
+    in_place: bool,
+    textures: bool,
+    lossy: bool,
+    compare: bool,
+    form: ReportFormat,
+) -> None:
+    from mdfconv.conversion.endpoint import with_specular
+    from mdfconv.scene.gltf import convert_gltf
+    from mdfconv.scene.gltf_factors import factor_endpoints
+    from mdfconv.scene.gltf_images import GltfTextures
+    from mdfconv.scene.shininess import ROUGHNESS, SHININESS
+
+    names = with_specular(source, target or ROUGHNESS, specular)
+    # A mistake in the names is none of a file.
+    ends = factor_endpoints(*names)
+    if compare and ends[0].distribution.name != SHININESS:
+        raise MdfconvError(f"--compare is about exponents, {ends[0].label} stores none")
+
+    def convert(destination: Destination, data: bytes) -> GltfConversion:
+        folders = GltfTextures(destination.source.parent, destination.output.parent, lossy)
+        chosen = folders if textures else None
+        with about(destination.source):
+            conversion = convert_gltf(data, *ends, metric=metric, textures=chosen)
+        problems = [(place, _with_option(text)) for place, text in conversion.problems]
+        return dataclasses.replace(conversion, problems=tuple(problems))
+
+    convert_files(
+        files,
+        output,
+        in_place=in_place,
+        convert=convert,
+        report=lambda converted: _report(converted, metric, names, form=form, compare=compare),
+    )
+
+
+def _with_option(problem: str) -> str:
+    """Return what is wrong with a material, with the option that helps."""
+    from mdfconv.scene.gltf import HAS_TEXTURE
+    from mdfconv.scene.image_picture import ACCEPT_LOSSES
+
+    if problem == HAS_TEXTURE:
+        return f"{problem}: --textures converts it"
+    return f"{problem} (--lossy)" if problem.endswith(ACCEPT_LOSSES) else problem
+
+
+def _propose(files: list[str]) -> None:
+    """Print which source each file's generator lets expect."""
+    from mdfconv.distributions.dialects import Specular
+    from mdfconv.scene.gltf import dialects_by_generator, generator_of
+    from mdfconv.scene.material_files import find_files, read_file
+
+    lines = []
+    for path in find_files(files):
+        with about(path):
+            generator = generator_of(read_file(path))
+        proposals = []
+        for dialect in dialects_by_generator(generator):
+            needed = " --specular L" if dialect.specular is Specular.needed else ""
+            provided = f" {dialect.provided}" if dialect.provided else ""
+            proposals.append(f"--from {dialect.owners[0]}:{dialect.name}{needed}{provided}")
+        said = f"asset.generator is '{generator}'" if generator else "no asset.generator"
+        lines.append(f"{path}: {said}: {' or '.join(proposals) or 'unknown'}")
+    typer.echo("\n".join(lines))
+
+
+def _report(
+    converted: list[tuple[Destination, GltfConversion]],
+    metric: Metric,
+    names: tuple[str, str],
+    *,
+    form: ReportFormat,
+    compare: bool,
+) -> None:
+    every = form is ReportFormat.json
+    records: list[dict[str, Any]] = [
+        {
+            "file": str(destination.source),
+            "output": str(destination.output),
+            "from": names[0],
+            "to": names[1],
+            "metric": str(metric),
+            "count": len(conversion.materials),
+            "materials": _rows(
+                conversion.materials[: None if every else MATERIALS_SHOWN], metric, compare=compare
+            ),
+            "textures": [str(path) for path in conversion.files],
+            "problems": [{"place": place, "problem": text} for place, text in conversion.problems],
+        }
+        for destination, conversion in converted
+    ]
+    if every:
+        typer.echo(json_text(records))
+        return
+    for record in records:
+        _print_table(record)
+        if compare:
+            print_importers(record["materials"])
+        for path in record["textures"]:
+            typer.echo(f"texture {path}", err=True)
+
+
+def _rows(
+    materials: Sequence[GltfMaterial], metric: Metric, *, compare: bool
+) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = [
+        vars(material) | {"notes": list(material.notes)} for material in materials
+    ]
+    if compare:
+        importer_rows(rows, [material.parameter for material in materials], metric)
+    return rows
+
+
+def _print_table(record: dict[str, Any]) -> None:
+    """Print what was converted to standard error."""
+    shown = [
+        {
+            "#": str(row["index"]),
+            "material": row["name"],
+            "was": number_cell(row["value"], 6),
+            "is": number_cell(row["result"], 6),
+            "RMSE": number_cell(row["rmse"], 3),
+            "notes": "; ".join(row["notes"]),
+        }
+        for row in record["materials"]
+    ]
+    title = f"{record['file']}, {record['metric']} metric"
+    print_materials(record["file"], shown, title, ["#", "was", "is", "RMSE"], record["count"])

@@ -2,7 +2,7 @@
 
 
 class MdfconvWarning(UserWarning):
-    """Elements of an array that have no answer and come back as NaN."""
+    """What a careful user must know of an answer, such as that elements of it are NaN."""
 
 
 class MdfconvError(ValueError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -18,6 +19,7 @@ from mdfconv.conversion.method import Method
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.equivalence import exact_route
 from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvWarning
 from mdfconv.fitting.metrics import metric_named
 
 # The computation is in float64 throughout: float32 rounds the input and the result.
@@ -102,6 +104,13 @@ def _with_gamma(end: Distribution, gamma: str) -> Distribution:
     return end.with_gamma(float(gamma)) if end.second_parameter else end
 
 
+def _converted(values: Array, source: Distribution, target: Distribution, method: Method) -> Any:
+    """Convert hard cases, of which nobody is to be warned."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MdfconvWarning)
+        return convert(values, Endpoint(source), Endpoint(target), method.name)
+
+
 def _formula(method: Method, batches: Iterator[_Batch]) -> Iterator[Finding]:
     forward, back = Tallies(), Tallies()
     for batch in batches:
@@ -109,7 +118,7 @@ def _formula(method: Method, batches: Iterator[_Batch]) -> Iterator[Finding]:
         comes_back = method.name in _INVERTIBLE or exact_route(source, target) is not None
         for dtype in _DTYPES:
             values = batch.of_type(dtype)
-            ours = convert(values, Endpoint(source), Endpoint(target), method.name)
+            ours = _converted(values, source, target, method)
             printed = printed_conversion(method, source, target, values)
             group = batch.regime, dtype
             forward.of(source.name, method.name, *group).add(
@@ -119,7 +128,7 @@ def _formula(method: Method, batches: Iterator[_Batch]) -> Iterator[Finding]:
                 if printed is not None:
                     printed = printed_conversion(method, target, source, printed)
                 back.of(source.name, f"{method.name} and back", *group).add(
-                    convert(ours, Endpoint(target), Endpoint(source), method.name),
+                    _converted(ours, target, source, method),
                     printed,
                     [Decimal(float(value)) for value in values],
                     [f"{case} → {source.name}" for case in batch.cases],

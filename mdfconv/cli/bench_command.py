@@ -16,6 +16,7 @@ from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
     from mdfconv.benchmark.measure import Measurements, Task
+    from mdfconv.conversion.endpoint import Endpoint
     from mdfconv.distributions.evaluation import Array
 
 # The paper's reference, and its common rough and smooth surface.
@@ -119,12 +120,23 @@ def _task(
     one_parameter_distribution(end.distribution.name)
     return Task(
         reference=end.distribution,
-        parameters=end.decode(parameter) if parameter else _default_lobes(end.distribution.name),
+        parameters=_lobes(end, parameter),
         candidates=tuple(one_parameter_distributions()),
         source=one_parameter_distribution(source),
         target=one_parameter_distribution(target),
         sizes=QUICK if quick else FULL,
     )
+
+
+def _lobes(end: Endpoint, parameter: list[float] | None) -> Array:
+    """Return the parameters of the reference, whose kernels compute in single precision, too."""
+    if not parameter:
+        return _default_lobes(end.distribution.name)
+    import numpy as np
+
+    mdf, single = end.distribution, np.dtype(np.float32)
+    lobes: Array = mdf.parameter.check(end.decode(parameter), mdf.name, single)
+    return lobes
 
 
 def _default_lobes(name: str) -> Array:

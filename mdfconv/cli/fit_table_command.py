@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mdfconv.distributions.evaluation import Array
     from mdfconv.fitting.metrics import Metric
 
-_LARGEST_SWEEP = 100_000
+_LARGEST_SWEEP = 10_000
 
 
 def command(

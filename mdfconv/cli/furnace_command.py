@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from mdfconv.brdf.furnace import FurnaceModel
     from mdfconv.distributions.evaluation import Array
 
-_MOST_POINTS = 10_001
+_MOST_POINTS = 1001
 _MOST_SAMPLES = 10_000_000
+# Samples at all points together: some seconds.
+_MOST_DIRECTIONS = 100_000_000
 
 
 def command(
@@ -100,6 +102,10 @@ def command(
         raise MdfconvError(f"--points is from 2 to {_MOST_POINTS}")
     if samples is not None and not 2 <= samples <= _MOST_SAMPLES:
         raise MdfconvError(f"--mc needs 2 samples or more, at most {_MOST_SAMPLES}")
+    if samples is not None and samples * points > _MOST_DIRECTIONS:
+        raise MdfconvError(
+            f"--mc {samples} at {points} --points are more than {_MOST_DIRECTIONS} directions"
+        )
     if seed < 0:
         raise MdfconvError(f"--seed is at least 0, not {seed}")
     check_outputs(png, output)

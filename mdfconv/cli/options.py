@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from mdfconv.conversion.arrays import Gamma
     from mdfconv.fitting.metrics import Metric
 
-_LARGEST_DPI = 2400
+# Of a page a hundred million pixels, a third of a gigabyte.
+_LARGEST_DPI = 1200
 
 
 class Format(StrEnum):

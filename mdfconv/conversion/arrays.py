@@ -7,6 +7,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from mdfconv.conversion.cautions import warn_of
 from mdfconv.conversion.endpoint import Endpoint, endpoints
 from mdfconv.conversion.method import Method
 from mdfconv.conversion.methods import default_method, method_named
@@ -73,7 +74,9 @@ def convert(
     Warns
     -----
     MdfconvWarning
-        Once, if elements of an array came back as NaN.
+        Once, if elements of an array came back as NaN; and once for what `explain` has as
+        cautions, such as that a value is outside the sweep for which the paper's formulas were
+        fitted.
 
     Examples
     --------
@@ -89,17 +92,19 @@ def convert(
         operand = as_operand(values)
         if isinstance(gamma, str):
             results = apply_free(kept, ends[0].decode(operand), *ends)
-            return tuple(_like(array, operand) for array in results[:2])
-        return _convert(operand, rule, kept, *ends, threads)
+            return _like(results[0], operand, ends[1]), _like(results[1], operand)
+        answer = _convert(operand, rule, kept, *ends, threads)
+        warn_of(rule, [(operand, answer)], *ends, stacklevel=2)
+        return answer
     check_pair(values, *ends)
     x, y = (as_operand(axis) for axis in ends[0].axes(values))
     try:
         np.broadcast_shapes(np.shape(x), np.shape(y))
     except ValueError:
         raise MdfconvError(f"shapes {np.shape(x)} and {np.shape(y)} are not a pair") from None
-    return ends[1].pair(
-        _convert(x, rule, kept, *ends, threads), _convert(y, rule, kept, *ends, threads)
-    )
+    answers = [_convert(axis, rule, kept, *ends, threads) for axis in (x, y)]
+    warn_of(rule, zip((x, y), answers, strict=True), *ends, stacklevel=2)
+    return ends[1].pair(*answers)
 
 
 def given_gamma(gamma: Gamma) -> float | None:
@@ -209,19 +214,39 @@ def _convert(
     results = in_threads(stored, operand, threads)
     if with_gaps:
         _warn_of_gaps(method, operand, results, source, target)
-    return _like(results, operand)
+    return _like(results, operand, target)
 
 
-def _like(result: Array, operand: Any) -> Any:
-    """Return results in the floating type of the operand that they came from."""
+def _like(result: Array, operand: Any, target: Endpoint | None = None) -> Any:
+    """Return results in the floating type of the operand that they came from.
+
+    Raises
+    ------
+    MdfconvError
+        If the type rounds one to a number that the target cannot store, such as 0.
+    """
     if isinstance(operand, float):
         return float(result)
     dtype = operand.dtype if operand.dtype.kind == "f" else np.dtype(np.float64)
-    with np.errstate(over="ignore"):
-        cast = result.astype(dtype)
-    if np.isinf(cast).any():
-        raise MdfconvError(f"a result is too large for {dtype.name}: convert in float64")
+    with np.errstate(over="ignore", under="ignore"):
+        # Without a copy of a large array, unless it would be the caller's own.
+        cast = result.astype(dtype, copy=np.may_share_memory(result, operand))
+    if dtype.itemsize < result.dtype.itemsize and cast.size:
+        _check_rounded(cast, result, target)
     return cast[()]
+
+
+def _check_rounded(cast: Array, result: Array, target: Endpoint | None) -> None:
+    low, high = cast.min(), cast.max()
+    stored = target.stored if target else None
+    if stored and stored.accepts(low) and stored.accepts(high):
+        return
+    kept = np.isfinite(cast) if stored is None else stored.accepts(cast)
+    # What was refused before is not for the type to answer for.
+    wrong = ~kept & (cast != result) & np.isfinite(result)
+    if wrong.any():
+        value = number_text(float(result.flat[int(np.argmax(wrong))]))
+        raise MdfconvError(f"a result, {value}, is none in {cast.dtype.name}", "convert in float64")
 
 
 def _apply_with_gaps(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from mdfconv.conversion.formulas import FormulaMethod
@@ -72,6 +74,7 @@ _FORMULAS = {
 }
 
 
+@lru_cache(maxsize=64)
 def _sweep(source: Distribution) -> list[float]:
     """Return the ends of the paper's sweep in the parameter of a distribution."""
     root, _ = to_root(source, same_lobe=False)

@@ -16,6 +16,7 @@ from mdfconv.conversion.arrays import (
     given_gamma,
     given_metric,
 )
+from mdfconv.conversion.cautions import cautions_of
 from mdfconv.conversion.endpoint import Endpoint, endpoints
 from mdfconv.conversion.method import Method
 from mdfconv.conversion.refusals import check_pair
@@ -25,6 +26,7 @@ from mdfconv.distributions.evaluation import Array, Mask, as_operand
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
 
+_NO_ERROR = "the lobe is beyond what double precision resolves: its error is not known"
 Value: TypeAlias = float | tuple[float, float]
 
 
@@ -98,7 +100,8 @@ def explain(
     source, target, method, metric, gamma
         As for `convert`.
     errors : bool
-        False saves the cost of `rmse` and `max_error`, which are then NaN.
+        False saves the cost of `rmse` and `max_error`, which are then NaN, as they are with a
+        caution for lobes that floats do not resolve.
 
     Returns
     -------
@@ -213,10 +216,12 @@ class _Table:
             self._answered_by = [method.name] * parameter.size
         else:
             self._answered_by = method.answered_by(parameter, *pair, metric)
-        self._cautions = self._all_cautions()
         self._errors = (
             self._remaining(free=free) if errors else (np.full_like(parameter, np.nan),) * 2
         )
+        self._cautions = self._all_cautions()
+        if errors and np.isnan(self._errors[0]).any():
+            self._cautions[_NO_ERROR] = np.isnan(self._errors[0])
 
     def _remaining(self, *, free: bool) -> tuple[Array, Array]:
         """Return the RMSE and the maximum error, shapes (n,)."""
@@ -266,18 +271,13 @@ class _Table:
 
     def _all_cautions(self) -> dict[str, Mask]:
         """Return sentences, and which of the numbers they are true of."""
-        every = np.ones(self._parameter.shape, bool)
-        cautions = {end.caution: every for end in (self._source, self._target) if end.caution}
-        for text, which in self._target.clamped(self._stored).items():
-            cautions[f"{self._target.label} clamps: {text}"] = which
-        if self._exact:
-            return cautions
-        pair = self._source.distribution, self._target.distribution
-        cautions |= self._method.cautions(self._parameter, self._result, *pair)
+        ends = self._source, self._target
+        cautions = cautions_of(self._method, self._parameter, self._result, self._stored, *ends)
         if self._at_limit.any():
-            low, high = pair[1].parameters[1].fit_range
+            mdf = ends[1].distribution
+            low, high = mdf.parameters[1].fit_range
             sentence = (
-                f"γ of {pair[1].name} is at the end of the range in which it is looked for, "
+                f"γ of {mdf.name} is at the end of the range in which it is looked for, "
                 f"{low:g} to {high:g}"
             )
             cautions[sentence] = self._at_limit

@@ -20,6 +20,11 @@ class Method(ABC):
     # Whether elements of an array that have no answer become NaN, with a warning.
     gaps_as_nan: ClassVar[bool] = False
 
+    @property
+    def has_cautions(self) -> bool:
+        """Whether a conversion may call for a caution."""
+        return type(self).cautions is not Method.cautions
+
     @abstractmethod
     def keeps(self, metric: Metric) -> str:
         """Return what the conversion keeps, to follow the word "keeps"."""

@@ -11,6 +11,8 @@ from mdfconv.fitting.problem import Problem, bounded_tangent, narrowest
 
 # 64 × 800 angles and what is computed there stay in the cache.
 _ROWS_AT_ONCE = 64
+# Of still narrower lobes quadratures lose digits, and squares of their peaks overflow.
+_NARROWEST = 1e-30  # radians
 
 
 def remaining_error(
@@ -37,23 +39,50 @@ def remaining_error(
     Returns
     -------
     rmse, max_error : numpy.ndarray, shape (n,)
-        √(∫ (S_t − S_s)² w dβ / ∫ S_s² w dβ), and max |S_t − S_s| / max |S_s|.
+        √(∫ (S_t − S_s)² w dβ / ∫ S_s² w dβ), and max |S_t − S_s| / max |S_s|; NaN for lobes that
+        floats do not resolve: narrower than 1e-30, or so wide or steep that their squares
+        overflow.
     """
     columns = []
     for rows in _blocks(parameter.size):
-        sources = source, parameter[rows]
-        if gamma is None:
-            shaped = target
-            widths = narrowest(*sources, target, result[rows])
-        else:
-            # A free γ makes the target as wide as the source.
-            shaped = target.with_gammas(gamma[rows, None])
-            widths = np.arctan(bounded_tangent(*sources))
-        every = np.arange(widths.size)
-        problem = Problem(*sources, shaped, metric, metric.quadrature(widths), every)
-        columns.append(np.stack(problem.relative_error(result[rows])))
+        with np.errstate(all="ignore"):
+            columns.append(
+                _errors(
+                    source,
+                    parameter[rows],
+                    target,
+                    result[rows],
+                    metric,
+                    None if gamma is None else gamma[rows],
+                )
+            )
     rmse, maximum = np.concatenate([np.zeros((2, 0)), *columns], axis=1)
     return rmse, maximum
+
+
+def _errors(
+    source: Distribution,
+    parameter: Array,
+    target: Distribution,
+    result: Array,
+    metric: Metric,
+    gamma: Array | None,
+) -> Array:
+    """Return both errors, shape (2, n), of so few values that the angles stay in the cache."""
+    sources = source, parameter
+    if gamma is None:
+        shaped = target
+        widths = narrowest(*sources, target, result)
+    else:
+        # A free γ makes the target as wide as the source.
+        shaped = target.with_gammas(gamma[:, None])
+        widths = np.arctan(bounded_tangent(*sources))
+    resolved = widths >= _NARROWEST
+    # Where nothing can be said the angles are those of any lobe.
+    angles = metric.quadrature(np.where(resolved, widths, 1.0))
+    problem = Problem(*sources, shaped, metric, angles, np.arange(widths.size))
+    errors: Array = np.stack(problem.relative_error(result))
+    return np.where(resolved & np.isfinite(errors).all(axis=0), errors, np.nan)
 
 
 def _blocks(size: int) -> list[slice]:

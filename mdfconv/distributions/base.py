@@ -11,7 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdfconv.distributions.declarations import Equivalent, MapVariables, Printed
-from mdfconv.distributions.evaluation import Array, Kernel, as_operand, evaluate
+from mdfconv.distributions.evaluation import (
+    Array,
+    Kernel,
+    as_operand,
+    computing_dtype,
+    evaluate,
+)
 from mdfconv.distributions.parameter import Encoding, Parameter, number_text
 from mdfconv.errors import MdfconvError
 
@@ -236,8 +242,14 @@ class Distribution(ABC):
         shares = np.asarray(as_operand(share), dtype=float)
         if not ((shares >= 0) & (shares <= 1)).all():
             raise MdfconvError("a share of the facets is from 0 to 1")
-        legal = np.asarray(self.parameter.check(parameter, self.name), dtype=float)
-        shares, legal = np.broadcast_arrays(shares, legal)
+        double = np.dtype(float)
+        legal = np.asarray(self.parameter.check(parameter, self.name, double), dtype=float)
+        try:
+            shares, legal = np.broadcast_arrays(shares, legal)
+        except ValueError:
+            raise MdfconvError(
+                f"shapes {shares.shape}, {legal.shape} do not broadcast against each other"
+            ) from None
         lobe, tail = (1 - shares, shares) if complement else (shares, 1 - shares)
         lobe, tail, legal = (np.atleast_1d(array) for array in (lobe, tail, legal))
         with np.errstate(all="ignore"):
@@ -401,7 +413,13 @@ class Distribution(ABC):
 
     def _normalized(self, beta: Array, parameter: Array, out: Array) -> None:
         self._lobe(beta, parameter, out)
-        out *= self._at_normal(parameter)
+        out *= self._finite(self._at_normal(parameter))
+
+    def _finite(self, peak: Array) -> Array:
+        """Return values of D(0); raise `MdfconvError` if one overflows."""
+        if not np.isfinite(peak).all():
+            raise MdfconvError(f"a lobe of {self.label} overflows {peak.dtype.name} at its peak")
+        return peak
 
     def _cumulative_lobe(self, beta: Array, parameter: Array, out: Array) -> None:
         np.minimum(self._cumulative(beta, parameter)[0], 1, out=out)
@@ -465,17 +483,23 @@ class Distribution(ABC):
             raise MdfconvError(
                 f"{self.name} is isotropic here: it takes one parameter and no azimuth phi"
             )
-        legal = self.parameter.check(parameter, self.name)
         if self.second_parameter is None:
             if gamma is not None:
                 raise MdfconvError(f"{self.name} has one parameter and no γ")
+            legal = self._held(parameter, beta)
             return evaluate(getattr(self, kernel), beta, legal, threads=threads)
         gammas = self.second_parameter.check(self.gamma if gamma is None else gamma, self.name)
+        legal = self._held(parameter, beta, gammas)
 
         def with_gamma(beta: Array, parameter: Array, gamma: Array, out: Array) -> None:
             getattr(self.with_gammas(gamma), kernel)(beta, parameter, out)
 
         return evaluate(with_gamma, beta, legal, gammas, threads=threads)
+
+    def _held(self, parameter: ArrayLike, *others: Any) -> Any:
+        """Return legal parameters that the type in which all is computed can hold."""
+        operands = [as_operand(operand) for operand in (parameter, *others)]
+        return self.parameter.check(operands[0], self.name, computing_dtype(*operands)[0])
 
 
 class AnisotropicDistribution(Distribution):
@@ -504,7 +528,7 @@ class AnisotropicDistribution(Distribution):
 
     def _normalized_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
         self._lobe_pair(beta, x, y, phi, out)
-        out *= self._at_normal_pair(x, y)
+        out *= self._finite(self._at_normal_pair(x, y))
 
     def _evaluate(
         self,
@@ -523,7 +547,7 @@ class AnisotropicDistribution(Distribution):
             raise MdfconvError(f"a pair of parameters has two members, not {len(parameter)}")
         if phi is None:
             raise MdfconvError("a pair of parameters needs an azimuth phi")
-        x, y = (self.parameter.check(value, self.name) for value in parameter)
+        x, y = (self._held(value, beta, phi) for value in parameter)
         return evaluate(getattr(self, f"{kernel}_pair"), beta, x, y, phi, threads=threads)
 
 

@@ -59,7 +59,17 @@ def as_operand(values: ArrayLike) -> Any:
         raise MdfconvError("expected numbers in an array of a regular shape") from None
     if array.dtype.kind not in "fiu":
         raise MdfconvError(f"expected real numbers, got {array.dtype.name}")
+    if array.dtype.kind == "f" and array.dtype.itemsize > np.dtype(float).itemsize:
+        _check_double(array)
     return array
+
+
+def _check_double(array: Array) -> None:
+    """Raise unless floats of a longer type are some in double precision, too."""
+    with np.errstate(all="ignore"):
+        double = array.astype(float)
+    if ((np.isinf(double) & np.isfinite(array)) | ((double == 0) & (array != 0))).any():
+        raise MdfconvError("a number is too large or too small for float64")
 
 
 def computing_dtype(*operands: Any) -> tuple[np.dtype[Any], np.dtype[Any]]:
@@ -148,6 +158,8 @@ def _run(kernel: Kernel, iterator: Any, start: int, end: int) -> None:
 
 def check_threads(threads: int) -> None:
     """Raise MdfconvError unless so many threads can run."""
+    if not isinstance(threads, int | np.integer):
+        raise MdfconvError(f"threads are counted, not {threads!r}")
     if threads < 1:
         raise MdfconvError(f"{threads} threads: at least 1")
 

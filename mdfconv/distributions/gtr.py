@@ -46,7 +46,18 @@ class GTR(Distribution):
     parameters = (
         Parameter("alpha", "C_TR", (0.01, 0.8), upper=1.0, upper_closed=True),
         # Towards γ → ∞ it becomes a Gaussian in sin β: α and γ can no longer be told apart.
-        Parameter("gamma", "γ", (1.5, 3.0), default=2.0, fit_range=(0.25, 64.0)),
+        # Towards 0 it becomes uniform. Beyond either end 1 − γ and the constants lose their digits.
+        Parameter(
+            "gamma",
+            "γ",
+            (1.5, 3.0),
+            1e-6,
+            1e6,
+            lower_closed=True,
+            upper_closed=True,
+            default=2.0,
+            fit_range=(0.25, 64.0),
+        ),
     )
     operations = 24
     printed = Printed(

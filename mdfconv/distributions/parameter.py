@@ -72,7 +72,18 @@ class Parameter:
         high = values <= self.upper if self.upper_closed else values < self.upper
         return low & high & (values < np.inf)
 
-    def check(self, values: ArrayLike, owner: str) -> Any:
+    def held(self, dtype: np.dtype[Any]) -> tuple[float, float]:
+        """Return between which values a lobe is one in a type of floats.
+
+        Beyond them α² underflows or the fourth power of α, which a maximum off the axis has,
+        overflows; an exponent is about 2/α².
+        """
+        limits = np.finfo(dtype)
+        if self.larger_is_smoother:
+            return 0.0, float(limits.max) / 16
+        return 2 * float(limits.tiny) ** 0.5, float(limits.max) ** 0.25 / 4
+
+    def check(self, values: ArrayLike, owner: str, dtype: np.dtype[Any] | None = None) -> Any:
         """Return the values as real operands, or say which one is illegal and why.
 
         Parameters
@@ -81,18 +92,24 @@ class Parameter:
             Candidate parameters.
         owner : str
             The distribution they belong to, for the message.
+        dtype : numpy.dtype, optional
+            The type of floats in which lobes of these parameters are evaluated.
 
         Raises
         ------
         MdfconvError
-            If a value is not a finite number inside the legal range.
+            If a value is not a finite number inside the legal range, or the type cannot hold
+            its lobe.
         """
         operand = as_operand(values)
         array = np.asarray(operand)
-        if array.size == 0 or (
-            # Two reductions need no memory; NaN fails both comparisons.
-            self.accepts(array.min()) and self.accepts(array.max())
-        ):
+        if array.size == 0:
+            return operand
+        # Two reductions need no memory; NaN fails both comparisons.
+        low, high = array.min(), array.max()
+        if self.accepts(low) and self.accepts(high):
+            if dtype is not None:
+                self._check_held(float(low), float(high), owner, dtype)
             return operand
         index = int(np.argmin(self.accepts(array)))
         bad = float(array.flat[index])
@@ -100,6 +117,19 @@ class Parameter:
         what = "not a finite number" if not np.isfinite(bad) else "outside the legal range"
         raise MdfconvError(
             f"{owner} {self.symbol} = {number_text(bad)} is {what}{which}: {self.legal}"
+        )
+
+    def _check_held(self, low: float, high: float, owner: str, dtype: np.dtype[Any]) -> None:
+        smallest, largest = self.held(dtype)
+        if smallest <= low and high <= largest:
+            return
+        bad, limit = (low, smallest) if low < smallest else (high, largest)
+        # Of an α the least is the smoothest.
+        smooth = (low < smallest) != self.larger_is_smoother
+        why = "a mirror" if smooth else "too rough"
+        raise MdfconvError(
+            f"{owner} {self.symbol} = {number_text(bad)} is {why} in {dtype.name}",
+            f"its lobes are {'from' if low < smallest else 'up to'} {limit:.3g}",
         )
 
     def check_one(self, value: float, owner: str) -> float:

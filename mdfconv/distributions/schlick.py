@@ -22,8 +22,8 @@ from mdfconv.distributions.parameter import Parameter
 # Where y = x/m is smaller than this, 1 − w is a difference of numbers that agree in too many digits
 # for the type at hand.
 _JUST_BEYOND = 1 + 1e-6
-# Before 80 halvings of the logarithm of w, which leave the rounding.
-_SMALLEST_DROP, _HALVINGS = 1e-20, 80
+# Of ln 10, between the ends of w: they leave the rounding.
+_HALVINGS = 56
 _EDGE = {np.dtype(np.float32): 1e-2, np.dtype(np.float64): 5e-4}
 
 
@@ -137,8 +137,8 @@ class Schlick(Distribution):
 
     def _half_tangent(self, parameter: Array) -> Array:
         # ½ (1 − m w)(1 + (1−m)/m · w (2−w))² = 1 − w, by halving the logarithm of w: a smooth lobe
-        # has it near 0.1 m, a rough one next to the edge at 1.
-        low, high = np.full_like(parameter, _SMALLEST_DROP), np.ones_like(parameter)
+        # has it near 0.2 m, a rough one next to the edge at 1, and all of them from 0.1 m to m.
+        low, high = 0.1 * parameter, 1.0 * parameter
         bend = (1 - parameter) / parameter
         for _ in range(_HALVINGS):
             w = np.sqrt(low * high)

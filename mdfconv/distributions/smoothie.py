@@ -86,6 +86,8 @@ class Smoothie(Distribution):
 
     def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         ratio = tangent_square(beta) * (1 + 4 * inverse_square(parameter))
+        # Finite, so that the share of the lobe is 1 where it overflows.
+        ratio = np.minimum(ratio, np.finfo(ratio.dtype).max)
         return ratio / (1 + ratio), 1 / (1 + ratio)
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:

@@ -50,9 +50,17 @@ class StudentT(Distribution):
     source = "Ribardière et al. 2017"
     parameters = (
         Parameter("alpha", "α", (0.01, 0.8)),
-        # Towards γ → ∞ it becomes Beckmann: the tails no longer tell γ.
+        # Towards γ → ∞ it becomes Beckmann: the tails no longer tell γ, and 1/γ loses its digits.
         Parameter(
-            "gamma", "γ", (2.0, 10.0), 2.0, lower_closed=True, default=2.0, fit_range=(2.0, 512.0)
+            "gamma",
+            "γ",
+            (2.0, 10.0),
+            2.0,
+            1e6,
+            lower_closed=True,
+            upper_closed=True,
+            default=2.0,
+            fit_range=(2.0, 512.0),
         ),
     )
     operations = 26

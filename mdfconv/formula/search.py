@@ -16,6 +16,8 @@ from mdfconv.formula.family import Formula, Shape, evaluate, horner, power, shap
 # Fits over the range, and the degree of the spline between them: on the usual ranges within the
 # rounding of float32 of the fit, and within 2e-5 at a kink, as where a maximum leaves the normal.
 _FITS, _SPLINE_DEGREE = 160, 5
+# Half a unit in the last place of single precision: no formula reaches less.
+_LEAST_TOLERANCE = 2.0**-24
 # Points at which the error is taken: what its peaks rise to between two of them is less than a
 # thousandth of it.
 _CHECKS = 4096
@@ -149,6 +151,11 @@ def cheapest(problem: Problem, tolerance: float) -> Formula:
     """
     if not tolerance > 0:
         raise MdfconvError(f"a tolerance is positive, not {tolerance:g}")
+    if tolerance < _LEAST_TOLERANCE:
+        raise MdfconvError(
+            f"a tolerance is at least {_LEAST_TOLERANCE:g}, about what single precision rounds, "
+            f"not {tolerance:g}"
+        )
     best: Formula | None = None
     for shape in shapes():
         if best is not None and shape.operations > best.shape.operations:

@@ -68,9 +68,11 @@ class Parameter:
 
     def accepts(self, values: Array) -> Any:
         """Return where values are finite and inside the legal range (bool, same shape)."""
-        low = values >= self.lower if self.lower_closed else values > self.lower
-        high = values <= self.upper if self.upper_closed else values < self.upper
-        return low & high & (values < np.inf)
+        # A limit that a short type cannot hold is infinite there, which is right.
+        with np.errstate(over="ignore"):
+            low = values >= self.lower if self.lower_closed else values > self.lower
+            high = values <= self.upper if self.upper_closed else values < self.upper
+            return low & high & (values < np.inf)
 
     def held(self, dtype: np.dtype[Any]) -> tuple[float, float]:
         """Return between which values a lobe is one in a type of floats.

@@ -61,3 +61,10 @@ def test_half_widths_of_smooth_lobes_are_similar(mdf, exponent):
     # NaN is an answer: it is not found.
     ratio = over_width(alpha)
     assert np.isnan(ratio) or ratio == pytest.approx(over_width(1e-7), rel=1e-6)
+
+
+@pytest.mark.parametrize("mdf", mdfconv.list_distributions(), ids=lambda mdf: mdf.name)
+def test_limits_beyond_a_short_type_limit_nothing_in_it(mdf):
+    for parameter in mdf.parameters:
+        assert parameter.accepts(np.float16(parameter.typical[0]))
+        assert not parameter.accepts(np.float16(np.inf))

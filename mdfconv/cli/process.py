@@ -39,8 +39,11 @@ def run(command: Callable[[], int | None]) -> int:
         if sys.stdout is None:
             raise MdfconvError("standard output is closed")
         with warnings.catch_warnings():
-            _tell_warnings()
+            notes = _collect_warnings()
             status = command() or 0
+        # Of a request that has no answer only the reason is of interest.
+        for note in dict.fromkeys(notes):
+            tell(f"note: {note}")
         sys.stdout.flush()
     except SystemExit as end:
         # Typer ends the process by itself where the reader of a pipe has gone.
@@ -122,17 +125,18 @@ def _flush_errors() -> None:
         _discard(sys.stderr)
 
 
-def _tell_warnings() -> None:
-    """Print what the library warns of as one line."""
-    usual = warnings.showwarning
+def _collect_warnings() -> list[str]:
+    """Return a list that takes what the library warns of; other warnings are shown as usual."""
+    usual, notes = warnings.showwarning, []
 
     def show(message: Any, category: type[Warning], *place: Any, **more: Any) -> None:
         if issubclass(category, MdfconvWarning):
-            tell(f"note: {message}")
+            notes.append(str(message))
         else:
             usual(message, category, *place, **more)
 
     warnings.showwarning = show
+    return notes
 
 
 def _refuse(message: str) -> int:

@@ -56,8 +56,12 @@ def command(
         typer.Option(help="ndf (default for text), or brdf at θ_d ≈ 0 (default for MERL, ALTA)."),
     ] = None,
     angle: Annotated[
-        str, typer.Option(metavar="COLUMN", help="Column of angles, by name or number from 1.")
-    ] = "1",
+        str | None,
+        typer.Option(
+            metavar="COLUMN",
+            help="Column of angles, by name or number from 1; by default from the names.",
+        ),
+    ] = None,
     angle_unit: Annotated[
         str | None,
         typer.Option(
@@ -187,18 +191,14 @@ def _tell(samples: Samples, results: list[_Result], tolerance: float, separate: 
         )
 
 
-def _read(path: Path, angle: str, unit: str | None, values: list[str] | None) -> Samples:
-    from mdfconv.measured.merl import read_merl
-    from mdfconv.measured.text import Columns, read_text
+def _read(path: Path, angle: str | None, unit: str | None, values: list[str] | None) -> Samples:
+    from mdfconv.measured.readers import ReadOptions, read
+    from mdfconv.measured.samples import Samples
 
-    try:
-        columns = Columns(angle, unit, tuple(values or ()))
-        if path.suffix.lower() == ".binary":
-            columns.refuse(path, "a MERL file has no columns")
-            return read_merl(path)
-        return read_text(path, columns)
-    except OSError as error:
-        raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
+    samples = read(path, ReadOptions(angle=angle, unit=unit, values=tuple(values or ())))
+    if not isinstance(samples, Samples):
+        raise MdfconvError(f"{path}: values against two directions are not fitted yet")
+    return samples
 
 
 def _restrict(

@@ -72,6 +72,11 @@ def _side(incident: bool, outgoing: bool) -> Role | None:
     return Role.theta_i if incident else Role.theta_o
 
 
+def is_angle(name: str) -> bool:
+    """Return whether a name is one of an angle, be it of coordinates that are not read."""
+    return bool(set(_words(name)) & (_ZENITH | _AZIMUTH | _ANGLE)) or role_of(name) is not None
+
+
 def is_value(name: str) -> bool:
     """Return whether a name is one of values: of a BRDF, a channel or a wavelength."""
     bare = _bare(name)

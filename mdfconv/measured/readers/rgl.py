@@ -76,7 +76,8 @@ def _fields(source: Source) -> dict[str, Array]:
     fields = {}
     for _ in range(count):
         (length,), position = _unpack(path, content, "<H", position)
-        name = content[position : position + length].decode("utf-8", errors="replace")
+        name = content[position : position + length].decode("ascii", errors="backslashreplace")
+        name = name if name.isprintable() else repr(name)
         (dimensions, kind, offset), position = _unpack(path, content, "<HBQ", position + length)
         if dimensions > _MOST_DIMENSIONS:
             raise MdfconvError(f"{path}: damaged: table '{name}' has {dimensions} axes")

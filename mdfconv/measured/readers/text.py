@@ -17,7 +17,7 @@ from mdfconv.measured.readers.choice import (
     told_unit,
     value_columns,
 )
-from mdfconv.measured.readers.columns import Role, is_counting, is_value, role_of
+from mdfconv.measured.readers.columns import Role, is_angle, is_counting, is_value, role_of
 from mdfconv.measured.readers.directions import directions
 from mdfconv.measured.readers.tables import Table, parse_table
 from mdfconv.measured.samples import UNITS, Samples, samples
@@ -82,7 +82,7 @@ def _angle_column(path: Path, table: Table, options: ReadOptions) -> tuple[int, 
             )
         several = len(table.names) > 2
         return 0, ("no names of columns: the first is taken for the angle",) * several
-    called = [index for index, name in enumerate(table.names) if role_of(name)]
+    called = [index for index, name in enumerate(table.names) if is_angle(name)]
     if len(called) == 1:
         return called[0], ()
     counting = index_columns(table)

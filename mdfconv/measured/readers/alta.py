@@ -20,7 +20,7 @@ from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, d
 from mdfconv.measured.readers.tables import parse_table
 from mdfconv.measured.samples import Samples, samples
 
-_TAG = re.compile(r"^#\s*([A-Z_]+)[ \t]+(.*?)\s*$", re.M)
+_TAG = re.compile(r"^#[ \t]*([A-Z_]+)[ \t]+([^\n]*?)\s*$", re.M)
 _DIMENSIONS = re.compile(r"^#\s*DIM\s+\S", re.M)
 _BEGIN = b"#BEGIN_STREAM"
 # Against the angle of the half vector alone, in this unit.
@@ -64,7 +64,7 @@ def _recognizes(name: str, head: bytes) -> bool:
 def _read(source: Source, options: ReadOptions) -> Samples | DirectionalSamples:
     path = source.path
     options.refuse(path, "ALTA's header names its columns")
-    tags = dict(_TAG.findall(decode_head(source.head)))
+    tags = dict(_TAG.findall("\n".join(decode_head(source.head).splitlines())))
     inputs, outputs = _dimensions(path, tags.get("DIM", ""))
     parametrization = tags.get("PARAM_IN", "").upper()
     _check_parametrization(path, parametrization, inputs)

@@ -16,8 +16,8 @@ from mdfconv.measured.readers.tables import parse_table
 from mdfconv.measured.readers.text import read_table
 from mdfconv.measured.samples import Samples
 
-_VARIABLES = re.compile(r"^\s*VARS\s*:?\s+(?P<names>\S.*?)\s*$", re.M | re.I)
-_COUNT = re.compile(r"^\s*NUM_POINTS\s*:?\s+(?P<count>\S+)", re.M | re.I)
+_VARIABLES = re.compile(r"^\s*VARS[ \t]*:?[ \t]+(?P<names>\S.*?)\s*$", re.M | re.I)
+_COUNT = re.compile(r"^\s*NUM_POINTS[ \t]*:?[ \t]+(?P<count>\S+)", re.M | re.I)
 
 
 def _recognizes(name: str, head: bytes) -> bool:

@@ -21,6 +21,12 @@ _BYTE_ORDER_MARKS = {
     b"\xfe\xff": "utf-16",
 }
 
+# They are quoted in messages, which are one line and say nothing to a terminal.
+_CONTROLS = dict.fromkeys(
+    {*range(32), *range(127, 160), 0x2028, 0x2029} - {ord("\t"), ord("\n"), ord("\r"), ord("\f")},
+    "\ufffd",
+)
+
 
 @dataclass(frozen=True)
 class ReadOptions:
@@ -116,7 +122,7 @@ def open_source(path: Path | str) -> Source:
 
 
 def decode(source: Source) -> str:
-    """Return the text of a source: UTF-8, or what its byte order mark says.
+    """Return the text of a source: UTF-8, or what its byte order mark says; no control characters.
 
     Raises
     ------
@@ -126,7 +132,7 @@ def decode(source: Source) -> str:
     content = source.content[:]
     encoding = _encoding(content)
     try:
-        return content.decode(encoding)
+        return content.decode(encoding).translate(_CONTROLS)
     except UnicodeDecodeError as error:
         name = "UTF-16" if encoding == "utf-16" else "UTF-8"
         raise MdfconvError(
@@ -136,7 +142,7 @@ def decode(source: Source) -> str:
 
 def decode_head(head: bytes) -> str:
     """Return the beginning of a file as text, with replacements for what is none."""
-    return head.decode(_encoding(head), errors="replace")
+    return head.decode(_encoding(head), errors="replace").translate(_CONTROLS)
 
 
 def _encoding(content: bytes) -> str:

@@ -177,8 +177,9 @@ def _with_option(problem: str) -> str:
 def _propose(files: list[str]) -> None:
     """Print which source each file's generator lets expect."""
     from mdfconv.distributions.dialects import Specular
+    from mdfconv.output.files import find_files
     from mdfconv.scene.gltf import dialects_by_generator, generator_of
-    from mdfconv.scene.material_files import find_files, read_file
+    from mdfconv.scene.material_files import read_file
 
     lines = []
     for path in find_files(files):

@@ -432,7 +432,7 @@ class _Problem:
     def _at_ends(self, point: Array) -> Iterator[str]:
         for name, value, low, high in zip(self._names, point, *self._bounds, strict=True):
             if min(value - low, high - value) < _AT_END:
-                yield f"{name} of {self._target.name} is at the end of its range"
+                yield f"{name} is at the end of its range"
 
     def _at(self, point: Array) -> Distribution:
         """Return the distribution with the γ of a point."""

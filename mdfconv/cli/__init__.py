@@ -23,6 +23,7 @@ _COMMANDS = (
     "convert",
     "formula",
     "mtl",
+    "mitsuba",
     "texture",
     "light",
     "list",

@@ -1,5 +1,6 @@
 """Scene files: material libraries and roughness textures."""
 
+from mdfconv.scene.mitsuba import convert_mitsuba
 from mdfconv.scene.mtl import convert_mtl
 from mdfconv.scene.texture import convert_texture, convert_texture_file
 from mdfconv.scene.texture_map import TextureReport
@@ -8,6 +9,7 @@ from mdfconv.scene.texture_rule import TextureRule
 __all__ = [
     "TextureReport",
     "TextureRule",
+    "convert_mitsuba",
     "convert_mtl",
     "convert_texture",
     "convert_texture_file",

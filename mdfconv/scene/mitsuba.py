@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import gc
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-
-import numpy as np
 
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.material_files import FileConversion
 from mdfconv.scene.mitsuba_edits import SceneEdits
 from mdfconv.scene.mitsuba_scene import (
-    DEFAULT_ALPHA,
     DISTRIBUTIONS,
     PHONG_EXPONENT,
     TARGETS,
@@ -134,32 +134,57 @@ def convert_mitsuba(
     """
     wanted = check_target(target)
     kept = metric_named(metric)
+    with _many_objects():
+        return _conversion(data, wanted, kept, texture)
+
+
+@contextmanager
+def _many_objects() -> Iterator[None]:
+    """Look for no cycles among objects that live to the end: that is two fifths of the time."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _conversion(
+    data: bytes, target: str, metric: Metric, texture: TextureConversion | None
+) -> MitsubaConversion:
     scene = read_scene(data)
-    tables = _tables(scene, wanted, kept)
+    tables = _tables(scene, target, metric)
     for bsdf in scene.bsdfs:
-        bsdf.problem = bsdf.problem or _number_problem(bsdf, tables, wanted)
-    leave_what_others_use(scene, wanted)
-    bitmaps = _convert_bitmaps(scene, wanted, texture)
+        bsdf.problem = bsdf.problem or _number_problem(bsdf, tables, target)
+    leave_what_others_use(scene, target)
+    bitmaps = _convert_bitmaps(scene, target, texture)
     # What shares something with a BSDF whose bitmap cannot be converted.
-    leave_what_others_use(scene, wanted)
-    edits = SceneEdits(data, wanted)
+    leave_what_others_use(scene, target)
+    edits = SceneEdits(data, target)
     materials, textures = [], {}
     for bsdf in scene.bsdfs:
         if bsdf.problem:
             continue
-        material = _material(bsdf, tables, wanted)
+        material = _material(bsdf, scene.lines(bsdf.element.start), tables, target)
         materials.append(material)
-        if bsdf.distribution != wanted:
+        if bsdf.distribution != target:
             edits.convert(bsdf, _axes(material.result))
-            for each in filter(None, (bitmaps.get(x.holder) for x in bsdf.roughness)):
-                edits.set_value(each.place, each.texture.result)
+            exchanged = [bitmaps[x.holder] for x in bsdf.roughness if x.holder in bitmaps]
+            for each in exchanged:
+                edits.set_file(each.place, each.texture.result)
                 textures[each.place] = each.texture
     return MitsubaConversion(
         data=edits.result(),
         materials=tuple(materials),
         textures=tuple(textures.values()),
-        includes=tuple((each.line, each.attributes.get("filename", "")) for each in scene.includes),
-        problems=tuple((bsdf.element.line, bsdf.problem) for bsdf in scene.bsdfs if bsdf.problem),
+        includes=tuple(
+            (scene.lines(each.start), each.attributes.get("filename", ""))
+            for each in scene.includes
+        ),
+        problems=tuple(
+            (scene.lines(bsdf.element.start), bsdf.problem) for bsdf in scene.bsdfs if bsdf.problem
+        ),
     )
 
 
@@ -179,7 +204,7 @@ def _tables(scene: Scene, target: str, metric: Metric) -> dict[str, ValueTable]:
     numbers: dict[str, set[float]] = {}
     for bsdf in scene.bsdfs:
         if not bsdf.problem and bsdf.distribution != target:
-            values = {each.value for each in bsdf.roughness if not np.isnan(each.value)}
+            values = {each.value for each in bsdf.roughness if not math.isnan(each.value)}
             numbers.setdefault(bsdf.source, set()).update(values)
     return {
         source: converted_values(values, source, target, metric)
@@ -192,25 +217,26 @@ def _number_problem(bsdf: Bsdf, tables: dict[str, ValueTable], target: str) -> s
     if bsdf.distribution == target:
         return ""
     table = tables[bsdf.source]
-    values = [each.value for each in bsdf.roughness if not np.isnan(each.value)]
+    values = [each.value for each in bsdf.roughness if not math.isnan(each.value)]
     if bsdf.source == PHONG_EXPONENT:
         return _phong_problem(values, table, target)
     for value in values:
+        if value in table.result:
+            continue
         what = f"alpha {value:g} of {bsdf.distribution}"
         if value == 0:
             return f"{what} is a mirror"
-        if not table.legal[table.rows[value]]:
+        if value not in table.legal:
             return f"{what} is out of range"
-        if np.isnan(table.result_of(value)):
-            return f"{what} has no answer in {target}"
+        return f"{what} has no answer in {target}"
     return ""
 
 
 def _phong_problem(values: list[float], table: ValueTable, target: str) -> str:
     problem = "the BSDF phong has no microfacets"
     for exponent in values:
-        alpha = table.result_of(exponent)
-        if not np.isnan(alpha):
+        alpha = table.result.get(exponent)
+        if alpha is not None:
             problem += f"; exponent {exponent:g} is nearest to {target} with alpha {alpha:.6g}"
     return problem
 
@@ -240,7 +266,7 @@ def _convert_bitmaps(
                 if convert is None:
                     raise MdfconvError(f"alpha is the texture {file}")
                 texture = MitsubaTexture(
-                    file, convert(file, bsdf.source), bsdf.distribution, place.line
+                    file, convert(file, bsdf.source), bsdf.distribution, scene.lines(place.start)
                 )
                 found[each.holder] = _Bitmap(place, texture)
             except MdfconvError as error:
@@ -249,29 +275,35 @@ def _convert_bitmaps(
     return found
 
 
-def _material(bsdf: Bsdf, tables: dict[str, ValueTable], target: str) -> MitsubaMaterial:
+def _material(bsdf: Bsdf, line: int, tables: dict[str, ValueTable], target: str) -> MitsubaMaterial:
     values = [each.value for each in bsdf.roughness]
     results, rmse, notes = values, 0.0, [f"{target} already"]
     if bsdf.distribution != target:
         table = tables[bsdf.source]
-        results = [table.result_of(value) for value in values]
-        rmse = float(np.max([table.rmse_of(value) for value in values]))
+        results = [table.result.get(value, math.nan) for value in values]
+        rmse = _worst(table, values)
         notes = [
             f"parameter {each.parameter}: convert what -D gives it, too"
             for each in bsdf.roughness
             if each.parameter
         ]
     if bsdf.roughness[0].holder is None:
-        notes.append(f"alpha {DEFAULT_ALPHA:g} by default")
+        notes.append("default α")
     return MitsubaMaterial(
         name=bsdf.name,
-        line=bsdf.element.line,
+        line=line,
         distribution=bsdf.distribution,
         value=_value(values),
         result=_value(results),
         rmse=rmse,
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _worst(table: ValueTable, values: list[float]) -> float:
+    """Return the largest error; NaN if one is not known."""
+    errors = [table.rmse.get(value, math.nan) for value in values]
+    return math.nan if any(map(math.isnan, errors)) else max(errors)
 
 
 def _axes(value: Value) -> list[float]:
@@ -303,7 +335,7 @@ def unchanged_errors(
     """
     numbers: dict[str, set[float]] = {}
     for each in materials:
-        values = {value for value in _axes(each.value) if not np.isnan(value)}
+        values = {value for value in _axes(each.value) if not math.isnan(value)}
         numbers.setdefault(each.distribution, set()).update(values)
     tables = {
         name: kept_values(values, DISTRIBUTIONS[name], target, metric)
@@ -311,8 +343,6 @@ def unchanged_errors(
         if name != target
     }
     return [
-        0.0
-        if each.distribution == target
-        else float(np.max([tables[each.distribution].rmse_of(x) for x in _axes(each.value)]))
+        0.0 if each.distribution == target else _worst(tables[each.distribution], _axes(each.value))
         for each in materials
     ]

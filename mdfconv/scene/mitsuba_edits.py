@@ -10,7 +10,7 @@ from mdfconv.scene.xml_edit import (
     apply_edits,
     attribute_text,
     children_insertion,
-    start_tag,
+    value_place,
 )
 
 # Mitsuba computes with 24 bits, which takes nine digits to tell all apart.
@@ -36,12 +36,17 @@ class SceneEdits:
         """Return the changed scene."""
         return apply_edits(self._data, self._edits)
 
-    def set_value(self, element: Element, text: str) -> None:
+    def set_value(self, element: Element, text: bytes) -> None:
         """Change the attribute ``value``, but not the blanks around it."""
-        where = start_tag(self._data, element).values["value"]
+        where = value_place(self._data, element)
         old = self._data[where]
         start = where.start + len(old) - len(old.lstrip())
-        self._edits[start] = slice(start, start + len(old.strip())), attribute_text(text)
+        self._edits[start] = slice(start, start + len(old.strip())), text
+
+    def set_file(self, element: Element, name: str) -> None:
+        """Change the attribute ``value`` to the name of another file."""
+        where = value_place(self._data, element)
+        self._edits[where.start] = where, attribute_text(name)
 
     def insert(self, element: Element, children: list[tuple[str, dict[str, str]]]) -> None:
         """Put properties before those that a BSDF has."""
@@ -52,7 +57,7 @@ class SceneEdits:
         """Give a BSDF the target's distribution, and new numbers for its α; NaN of a texture."""
         new: list[tuple[str, dict[str, str]]] = []
         if bsdf.named_by is not None:
-            self.set_value(bsdf.named_by, self._target)
+            self.set_value(bsdf.named_by, self._target.encode())
         elif self._target != DEFAULT_DISTRIBUTION:
             new.append(("string", {"name": "distribution", "value": self._target}))
         for each, result in zip(bsdf.roughness, results, strict=True):
@@ -61,6 +66,6 @@ class SceneEdits:
                 if result != DEFAULT_ALPHA:
                     new.append(("float", {"name": "alpha", "value": text}))
             elif not each.textured:
-                self.set_value(each.holder, text)
+                self.set_value(each.holder, text.encode())
         if new:
             self.insert(bsdf.element, new)

@@ -7,15 +7,14 @@ or both ``alpha_u`` and ``alpha_v`` (0.6: ``alphaU`` and ``alphaV``).
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from mdfconv.errors import MdfconvError
-from mdfconv.scene.xml_edit import Element, read_elements
+from mdfconv.scene.xml_edit import Element, Lines, read_elements
 
 # What Mitsuba's distributions are here. Those of 0.6 have an exponent for an α.
 _EXPONENT = "blinn-phong:mitsuba-phong"
@@ -26,9 +25,13 @@ DEFAULT_DISTRIBUTION, DEFAULT_ALPHA = "beckmann", 0.1
 PHONG, PHONG_EXPONENT, _DEFAULT_EXPONENT = "phong", "blinn-phong:reflected", 30.0
 
 _MICROFACET_TYPES = {"roughconductor", "roughdielectric", "roughplastic", "roughcoating"}
-# Mitsuba 3 reads the older names in older scenes.
-_AXES = {"alphaU": "alpha_u", "alphaV": "alpha_v"}
-_ALPHAS: tuple[set[str], ...] = (set(), {"alpha"}, set(_AXES.values()))
+_AXES = ("alpha_u", "alpha_v")
+# By the names of 0.6, too, which Mitsuba 3 reads in older scenes.
+_PROPERTIES = {name: name for name in ("distribution", "alpha", *_AXES)} | {
+    "alphaU": "alpha_u",
+    "alphaV": "alpha_v",
+}
+_ALPHAS: tuple[set[str], ...] = (set(), {"alpha"}, set(_AXES))
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\Z")
 _PARAMETER = re.compile(r"\$(\w+)\Z")
 _USED = re.compile(r"\$(\w+)")
@@ -112,9 +115,12 @@ class Scene:
         What stands in other files.
     uses : Counter
         How often each default or texture is used, by its element.
+    lines : Lines
+        The lines of elements.
     """
 
     version: int | None
+    lines: Lines
     bsdfs: list[Bsdf] = field(default_factory=list)
     includes: list[Element] = field(default_factory=list)
     uses: Counter[Element] = field(default_factory=Counter)
@@ -129,9 +135,9 @@ def read_scene(data: bytes) -> Scene:
         As `read_elements`.
     """
     elements = read_elements(data)
-    names = _Names(elements)
+    names = _Names(elements, parameters=b"$" in data)
     version = re.match(r"\s*(\d{1,9})\b", elements[0].attributes.get("version", ""))
-    scene = Scene(int(version[1]) if version else None, uses=names.uses)
+    scene = Scene(int(version[1]) if version else None, Lines(data), uses=names.uses)
     for element in elements:
         if element.tag == "include":
             scene.includes.append(element)
@@ -147,29 +153,41 @@ def read_scene(data: bytes) -> Scene:
 class _Names:
     """What is called by a name in a scene: parameters with defaults, and textures with ids."""
 
-    def __init__(self, elements: list[Element]) -> None:
+    def __init__(self, elements: list[Element], *, parameters: bool) -> None:
         # Of several defaults Mitsuba takes the first.
         self.defaults: dict[str, Element] = {}
         self.textures: dict[str, Element] = {}
-        used: Counter[str] = Counter()
-        referred: Counter[str] = Counter()
-        self.uses: Counter[Element] = Counter()
+        textures, referred = False, Counter[str]()
         for element in elements:
-            attributes = element.attributes
-            if element.tag == "default":
-                self.defaults.setdefault(attributes.get("name", ""), element)
-            elif element.tag == "texture" and "id" in attributes:
-                self.textures.setdefault(attributes["id"], element)
-            elif element.tag in ("ref", "alias"):
-                referred[attributes.get("id", "")] += 1
-            # One that stands in an object is a property of it; a scene only gives it an id.
-            if element.tag != "scene":
-                self.uses.update(child for child in element.children if child.tag == "texture")
-            for value in attributes.values():
-                if "$" in value:
-                    used.update(_USED.findall(value))
-        self.uses.update({element: used[name] for name, element in self.defaults.items()})
-        self.uses.update({element: referred[name] for name, element in self.textures.items()})
+            tag = element.tag
+            if tag == "default":
+                self.defaults.setdefault(element.attributes.get("name", ""), element)
+            elif tag == "texture":
+                textures = True
+                if "id" in element.attributes:
+                    self.textures.setdefault(element.attributes["id"], element)
+            elif tag in ("ref", "alias"):
+                referred[element.attributes.get("id", "")] += 1
+        self.uses = Counter({element: referred[name] for name, element in self.textures.items()})
+        if textures:
+            self.uses.update(_properties_that_are_textures(elements))
+        if parameters:
+            used = Counter(_parameters_used(elements))
+            self.uses.update({element: used[name] for name, element in self.defaults.items()})
+
+
+def _properties_that_are_textures(elements: list[Element]) -> Iterator[Element]:
+    """Yield the textures that stand in other objects; a scene only gives them an id."""
+    for element in elements:
+        if element.children and element.tag != "scene":
+            yield from (child for child in element.children if child.tag == "texture")
+
+
+def _parameters_used(elements: list[Element]) -> Iterator[str]:
+    for element in elements:
+        for value in element.attributes.values():
+            if "$" in value:
+                yield from _USED.findall(value)
 
 
 class _RefusalError(Exception):
@@ -179,14 +197,14 @@ class _RefusalError(Exception):
 def _microfacet_bsdf(element: Element, version: int | None, names: _Names) -> Bsdf:
     bsdf = Bsdf(element)
     try:
-        found = dict(_properties(element))
-        bsdf.named_by = found.pop("distribution", None)
+        alphas = _properties(element)
+        bsdf.named_by = alphas.pop("distribution", None)
         if bsdf.named_by is not None:
             bsdf.distribution = _distribution(bsdf.named_by, version)
-        if set(found) not in _ALPHAS:
-            raise _RefusalError(f"{', '.join(found)}: neither alpha alone nor alpha_u and alpha_v")
-        alphas = [found[name] for name in sorted(found)]
-        bsdf.roughness = tuple(_roughness(alpha, names) for alpha in alphas)
+        if alphas.keys() not in _ALPHAS:
+            given = " and ".join(alphas)
+            raise _RefusalError(f"{given}: neither alpha alone nor alpha_u and alpha_v")
+        bsdf.roughness = tuple([_roughness(alphas[name], names) for name in sorted(alphas)])
         if not alphas:
             bsdf.roughness = (Roughness(DEFAULT_ALPHA),)
     except _RefusalError as refusal:
@@ -194,18 +212,16 @@ def _microfacet_bsdf(element: Element, version: int | None, names: _Names) -> Bs
     return bsdf
 
 
-def _properties(bsdf: Element) -> Iterator[tuple[str, Element]]:
-    """Yield the properties that make the roughness, by their names in Mitsuba 3."""
-    seen = set()
+def _properties(bsdf: Element) -> dict[str, Element]:
+    """Return the properties that make the roughness, by their names in Mitsuba 3."""
+    found: dict[str, Element] = {}
     for child in bsdf.children:
-        name = child.attributes.get("name", "")
-        name = _AXES.get(name, name)
-        if name not in ("distribution", "alpha", *_AXES.values()):
-            continue
-        if name in seen:
+        name = _PROPERTIES.get(child.attributes.get("name", ""))
+        if name in found:
             raise _RefusalError(f"{name} is given twice")
-        seen.add(name)
-        yield name, child
+        if name is not None:
+            found[name] = child
+    return found
 
 
 def _distribution(element: Element, version: int | None) -> str:
@@ -221,19 +237,21 @@ def _distribution(element: Element, version: int | None) -> str:
 def _roughness(element: Element, names: _Names) -> Roughness:
     name, value = element.attributes["name"], element.attributes.get("value", "")
     if element.tag == "texture":
-        return Roughness(np.nan, element, textured=True)
+        return Roughness(math.nan, element, textured=True)
     if element.tag == "ref":
         identifier = element.attributes.get("id", "")
         if identifier not in names.textures:
             raise _RefusalError(
                 f"{name} refers to '{identifier}', which is no texture in this file"
             )
-        return Roughness(np.nan, names.textures[identifier], textured=True)
+        return Roughness(math.nan, names.textures[identifier], textured=True)
     if element.tag != "float":
         raise _RefusalError(f"{name} is a {element.tag}, not a float")
+    if "$" not in value:
+        return Roughness(_number(name, value), element)
     parameter = _PARAMETER.match(value.strip())
     if not parameter:
-        return Roughness(_number(name, value), element)
+        raise _RefusalError(f"{name} '{value}' is not a number")
     default = names.defaults.get(parameter[1])
     if default is None:
         raise _RefusalError(
@@ -255,7 +273,7 @@ def _phong_bsdf(element: Element, names: _Names) -> Bsdf:
     try:
         values = [_roughness(child, names).value for child in given] or [_DEFAULT_EXPONENT]
     except _RefusalError:
-        values = [np.nan]
+        values = [math.nan]
     bsdf.roughness = (Roughness(values[0]),)
     return bsdf
 

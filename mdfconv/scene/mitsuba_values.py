@@ -10,7 +10,7 @@ import numpy as np
 from mdfconv.conversion.endpoint import Endpoint, endpoints
 from mdfconv.conversion.methods import default_method
 from mdfconv.conversion.remaining_error import remaining_error
-from mdfconv.distributions.evaluation import Array, Mask
+from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.interpolation import WORTH_IT, interpolated
 from mdfconv.fitting.metrics import Metric
 
@@ -24,26 +24,15 @@ class ValueTable:
 
     Parameters
     ----------
-    rows : dict of float to int
-        Where each number stands in the arrays.
-    legal : numpy.ndarray of bool, shape (n,)
-        Whether it is in the distribution's range.
-    result, rmse : numpy.ndarray, shape (n,)
-        α of the target, NaN if there is none, and the error that remains.
+    legal : frozenset of float
+        Those in the distribution's range.
+    result, rmse : dict of float to float
+        α of the target, and the error that remains, for those that have an answer.
     """
 
-    rows: dict[float, int]
-    legal: Mask
-    result: Array
-    rmse: Array
-
-    def result_of(self, value: float) -> float:
-        """Return what becomes of a number; NaN if it is none."""
-        return float(self.result[self.rows[value]]) if value in self.rows else np.nan
-
-    def rmse_of(self, value: float) -> float:
-        """Return the error that remains of a number; NaN if it is none."""
-        return float(self.rmse[self.rows[value]]) if value in self.rows else np.nan
+    legal: frozenset[float]
+    result: dict[float, float]
+    rmse: dict[float, float]
 
 
 def converted_values(
@@ -85,8 +74,7 @@ def _table(
     with np.errstate(all="ignore"):
         parameter = source.decode_legal(values)
     legal = ~np.isnan(parameter)
-
-    result, rmse = np.full((2, values.size), np.nan)
+    result = np.full_like(values, np.nan)
     result[legal] = _answers(rule, parameter[legal], target)
 
     def errors(parameter: Array) -> Array:
@@ -99,9 +87,13 @@ def _table(
         return found
 
     answered = ~np.isnan(result)
-    rmse[answered] = _of_many(errors, parameter[answered])
-    rows = {value: row for row, value in enumerate(values.tolist())}
-    return ValueTable(rows, legal, result, rmse)
+    keys, found = values[answered].tolist(), result[answered].tolist()
+    rmse = _of_many(errors, parameter[answered]).tolist()
+    return ValueTable(
+        frozenset(values[legal].tolist()),
+        dict(zip(keys, found, strict=True)),
+        dict(zip(keys, rmse, strict=True)),
+    )
 
 
 def _answers(rule: _Rule, parameter: Array, target: Endpoint) -> Array:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 from xml.parsers import expat
 from xml.sax.saxutils import escape
@@ -19,14 +18,20 @@ from mdfconv.errors import MdfconvError
 DEEPEST = 1000
 _UTF_8 = ("utf-8", "utf8", "us-ascii", "ascii")
 _BLANK = rb"[ \t\r\n]"
-_ATTRIBUTE = re.compile(
-    _BLANK + rb"+([^ \t\r\n=/>]+)" + _BLANK + rb"*=" + _BLANK + rb"*(\"[^\"]*\"|'[^']*')"
+_ATTRIBUTE = rb"(?:[ \t\r\n]+[^ \t\r\n=/>]+[ \t\r\n]*=[ \t\r\n]*(?:\"[^\"]*\"|'[^']*'))"
+_NAME = rb"<[^ \t\r\n/>]+"
+_VALUE = re.compile(
+    _NAME + _ATTRIBUTE + rb"*?([ \t\r\n]+value[ \t\r\n]*=[ \t\r\n]*)(\"[^\"]*\"|'[^']*')"
 )
-_TAG_END = re.compile(rb"(" + _BLANK + rb"*)(/?)>")
-_TAG_NAME = re.compile(rb"<[^ \t\r\n/>]+")
+# What ends it: the blanks before a slash, the slash, and the bracket.
+_START_TAG = re.compile(_NAME + _ATTRIBUTE + rb"*([ \t\r\n]*(/?)>)")
+_QUOTE = re.compile(rb"[^\"']*([\"'])")
 
 
-@dataclass(slots=True, eq=False)
+# Most elements have none in them; never changed.
+_NONE: list[Any] = []
+
+
 class Element:
     """An element of an XML file.
 
@@ -38,39 +43,32 @@ class Element:
         The values that its attributes have for a reader: references replaced, blanks normalized.
     start : int
         Where its first byte, ``<``, stands.
-    line : int
-        Its line, counted from 1.
-    children : list of Element
-        Those directly in it, in order.
     """
 
-    tag: str
-    attributes: dict[str, str]
-    start: int
-    line: int
-    children: list[Element] = field(default_factory=list)
+    __slots__ = ("attributes", "children", "start", "tag")
+
+    def __init__(self, tag: str, attributes: dict[str, str], start: int) -> None:
+        self.tag, self.attributes, self.start = tag, attributes, start
+        # Those directly in it, in order.
+        self.children: list[Element] = _NONE
 
 
-@dataclass(frozen=True)
-class StartTag:
-    """Where the parts of an element's first tag stand.
+class Lines:
+    """The lines of a file, counted from 1: quick for places that are asked for in order."""
 
-    Parameters
-    ----------
-    values : dict of str to slice
-        The values of attributes, between their quotes, by name.
-    end : slice
-        What ends the tag: ``>``, or ``/>`` with the blanks before it.
-    empty : bool
-        Whether the element ends with the tag.
-    quote : bytes
-        The mark around the values, that of the first attribute.
-    """
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._position, self._line = 0, 1
 
-    values: dict[str, slice]
-    end: slice
-    empty: bool
-    quote: bytes
+    def __call__(self, position: int) -> int:
+        """Return the line of a byte that does not end one."""
+        if position < self._position:
+            self._position, self._line = 0, 1
+        part = self._position, position
+        count = self._data.count
+        self._line += count(b"\n", *part) + count(b"\r", *part) - count(b"\r\n", *part)
+        self._position = position
+        return self._line
 
 
 def read_elements(data: bytes) -> list[Element]:
@@ -87,69 +85,63 @@ def read_elements(data: bytes) -> list[Element]:
     parser = expat.ParserCreate()
     # Defaults that a document type gives to attributes have no bytes to change.
     parser.specified_attributes = True
-    builder = _Builder(parser)
+    parser.XmlDeclHandler = _check_encoding
+    parser.StartDoctypeDeclHandler = _check_document_type
+    parser.EntityDeclHandler = _refuse_entity
+    elements: list[Element] = []
+    open_ones: list[Element] = []
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        element = Element(tag, attributes, parser.CurrentByteIndex)
+        elements.append(element)
+        if open_ones:
+            parent = open_ones[-1]
+            if not parent.children:
+                parent.children = [element]
+            else:
+                parent.children.append(element)
+        open_ones.append(element)
+        if len(open_ones) > DEEPEST:
+            raise MdfconvError(f"elements are nested more than {DEEPEST} levels deep")
+
+    def end(tag: str) -> None:
+        open_ones.pop()
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
         raise MdfconvError(f"not well-formed XML, line {error.lineno}: {reason}") from None
-    return builder.elements
+    return elements
 
 
-class _Builder:
-    """Collects what Expat finds."""
-
-    def __init__(self, parser: expat.XMLParserType) -> None:
-        self.elements: list[Element] = []
-        self._open: list[Element] = []
-        self._parser = parser
-        parser.StartElementHandler = self._start
-        parser.EndElementHandler = self._end
-        parser.XmlDeclHandler = self._declaration
-        parser.StartDoctypeDeclHandler = self._document_type
-        parser.EntityDeclHandler = self._entity
-
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        parser, stack = self._parser, self._open
-        element = Element(tag, attributes, parser.CurrentByteIndex, parser.CurrentLineNumber)
-        if stack:
-            stack[-1].children.append(element)
-            if len(stack) >= DEEPEST:
-                raise MdfconvError(f"elements are nested more than {DEEPEST} levels deep")
-        stack.append(element)
-        self.elements.append(element)
-
-    def _end(self, tag: str) -> None:
-        self._open.pop()
-
-    def _declaration(self, version: str, encoding: str | None, standalone: int) -> None:
-        if encoding is not None and encoding.lower() not in _UTF_8:
-            raise MdfconvError(f"the file is in {encoding}, not in UTF-8")
-
-    def _document_type(
-        self, name: str, system: str | None, public: str | None, internal: bool
-    ) -> None:
-        if system is not None or public is not None:
-            raise MdfconvError("the document type stands in another file, which is not read")
-
-    def _entity(self, name: str, *_: Any) -> None:
-        raise MdfconvError(f"the file declares the entity {name}, and entities are not read")
+def _check_encoding(version: str, encoding: str | None, standalone: int) -> None:
+    if encoding is not None and encoding.lower() not in _UTF_8:
+        raise MdfconvError(f"the file is in {encoding}, not in UTF-8")
 
 
-def start_tag(data: bytes, element: Element) -> StartTag:
-    """Return where the parts of an element's first tag stand, in the file it was read from."""
-    name = _TAG_NAME.match(data, element.start)
-    assert name is not None
-    values: dict[str, slice] = {}
-    position, quote = name.end(), b'"'
-    while match := _ATTRIBUTE.match(data, position):
-        if not values:
-            quote = match[2][:1]
-        values[match[1].decode()] = slice(match.start(2) + 1, match.end(2) - 1)
-        position = match.end()
-    end = _TAG_END.match(data, position)
-    assert end is not None
-    return StartTag(values, slice(*end.span()), bool(end[2]), quote)
+def _check_document_type(name: str, system: str | None, public: str | None, internal: bool) -> None:
+    if system is not None or public is not None:
+        raise MdfconvError("the document type stands in another file, which is not read")
+
+
+def _refuse_entity(name: str, *_: Any) -> None:
+    raise MdfconvError(f"the file declares the entity {name}, and entities are not read")
+
+
+def value_place(data: bytes, element: Element) -> slice:
+    """Return where the attribute ``value``, which an element has, stands in the file."""
+    match = _VALUE.match(data, element.start)
+    assert match is not None
+    return slice(match.start(2) + 1, match.end(2) - 1)
+
+
+def _start_tag(data: bytes, element: Element) -> re.Match[bytes]:
+    match = _START_TAG.match(data, element.start)
+    assert match is not None
+    return match
 
 
 def attribute_text(value: str) -> bytes:
@@ -179,22 +171,24 @@ def children_insertion(
     slice, bytes
         What to replace, and by what.
     """
-    tag = start_tag(data, element)
+    tag = _start_tag(data, element)
+    ending = b"/>"
     if element.children:
         gap, closing = _blanks_before(data, element.children[0].start), b""
-        first = start_tag(data, element.children[0])
-        end = data[first.end] if first.empty else b"/>"
+        first = _start_tag(data, element.children[0])
+        ending = first[1] if first[2] else ending
     else:
         closing = _blanks_before(data, element.start)
-        gap, end = closing and closing + _step(data, closing), b"/>"
-        if not tag.empty and data[tag.end.stop : tag.end.stop + 2] != b"</":
+        gap = closing and closing + _step(data, closing)
+        if not tag[2] and data[tag.end() : tag.end() + 2] != b"</":
             closing = b""
-    texts = [gap + _empty_element(*child, tag.quote, end) for child in children]
-    inner = b"".join(texts) + closing
-    if not tag.empty:
-        return slice(tag.end.stop, tag.end.stop), inner
+    quote = _QUOTE.match(tag[0])
+    mark = quote[1] if quote else b'"'
+    inner = b"".join(gap + _empty_element(*child, mark, ending) for child in children) + closing
+    if not tag[2]:
+        return slice(tag.end(), tag.end()), inner
     name = element.tag.encode()
-    return tag.end, b">" + inner + b"</" + name + b">"
+    return slice(*tag.span(1)), b">" + inner + b"</" + name + b">"
 
 
 def _empty_element(tag: str, attributes: dict[str, str], quote: bytes, end: bytes) -> bytes:

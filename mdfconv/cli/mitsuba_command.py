@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from mdfconv.scene.material_files import Destination
     from mdfconv.scene.mitsuba import MitsubaConversion, Value
 
-_RIGHT = ("line", "α", "new α", "RMSE", "α kept")
+_RIGHT = ("line", "α", "new α", "RMSE", "kept")
 
 
 def command(
@@ -46,7 +46,7 @@ def command(
     ] = False,
     compare: Annotated[
         bool,
-        typer.Option("--compare", help="Add the error of the new distribution with alpha kept."),
+        typer.Option("--compare", help="Add what is left if alpha is kept: its error."),
     ] = False,
     format_: ReportFormatOption = ReportFormat.table,
 ) -> None:
@@ -83,12 +83,14 @@ def command(
         return dataclasses.replace(conversion, files=files)
 
     def report(converted: list[tuple[Destination, MitsubaConversion]]) -> None:
-        records = [_record(*each, wanted, kept, compare=compare) for each in converted]
         if format_ is ReportFormat.json:
+            records = [_record(*each, wanted, kept, compare=compare) for each in converted]
             typer.echo(json_text(records))
-        else:
-            for record in records:
-                _print_table(record)
+            return
+        for each in converted:
+            record = _record(*each, wanted, kept, compare=compare, most=ROWS_SHOWN)
+            _print_table(record)
+            tell_rest(len(each[1].materials), "--format json")
 
     convert_files(scenes, output, in_place=in_place, convert=convert, report=report)
 
@@ -100,12 +102,14 @@ def _record(
     metric: Metric,
     *,
     compare: bool,
+    most: int | None = None,
 ) -> dict[str, Any]:
-    materials = [vars(each) | {"notes": list(each.notes)} for each in conversion.materials]
+    """Return what is said of a scene, of its first materials if there is a limit."""
+    materials = [vars(each) | {"notes": list(each.notes)} for each in conversion.materials[:most]]
     if compare:
         from mdfconv.scene.mitsuba import unchanged_errors
 
-        errors = unchanged_errors(conversion.materials, target, metric)
+        errors = unchanged_errors(conversion.materials[:most], target, metric)
         for row, error in zip(materials, errors, strict=True):
             row["rmse_unchanged"] = error
     return {
@@ -132,16 +136,15 @@ def _print_table(record: dict[str, Any]) -> None:
             "new α": _cell(row["result"]),
             "RMSE": number_cell(row["rmse"], 3),
         }
-        | ({"α kept": number_cell(row["rmse_unchanged"], 3)} if "rmse_unchanged" in row else {})
+        | ({"kept": number_cell(row["rmse_unchanged"], 3)} if "rmse_unchanged" in row else {})
         | {"notes": "; ".join(row["notes"])}
-        for row in record["materials"][:ROWS_SHOWN]
+        for row in record["materials"]
     ]
     if rows:
         title = f"{record['file']}, {record['target']}, {record['metric']} metric"
         print_table(rich_table(list(rows[0]), rows, title, right=_RIGHT), err=True)
     else:
         typer.echo(f"{record['file']}: nothing to convert", err=True)
-    tell_rest(len(record["materials"]), "--format json")
     for texture in record["textures"]:
         typer.echo(
             f"{texture['file']} became {texture['result']} (line {texture['line']})", err=True

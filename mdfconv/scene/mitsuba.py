@@ -170,8 +170,7 @@ def _conversion(
         materials.append(material)
         if bsdf.distribution != target:
             edits.convert(bsdf, _axes(material.result))
-            exchanged = [bitmaps[x.holder] for x in bsdf.roughness if x.holder in bitmaps]
-            for each in exchanged:
+            for each in [bitmaps[x.holder] for x in bsdf.roughness if x.holder in bitmaps]:
                 edits.set_file(each.place, each.texture.result)
                 textures[each.place] = each.texture
     return MitsubaConversion(
@@ -277,32 +276,34 @@ def _convert_bitmaps(
 
 def _material(bsdf: Bsdf, line: int, tables: dict[str, ValueTable], target: str) -> MitsubaMaterial:
     values = [each.value for each in bsdf.roughness]
-    results, rmse, notes = values, 0.0, [f"{target} already"]
-    if bsdf.distribution != target:
+    results, rmse, notes = values, 0.0, []
+    if bsdf.distribution == target:
+        notes = [f"{target} already"]
+    else:
         table = tables[bsdf.source]
         results = [table.result.get(value, math.nan) for value in values]
         rmse = _worst(table, values)
-        notes = [
-            f"parameter {each.parameter}: convert what -D gives it, too"
-            for each in bsdf.roughness
-            if each.parameter
-        ]
-    if bsdf.roughness[0].holder is None:
-        notes.append("default α")
+    for each in bsdf.roughness:
+        if each.parameter and results is not values:
+            notes.append(f"parameter {each.parameter}: convert what -D gives it, too")
+        elif each.holder is None:
+            notes.append("default α")
     return MitsubaMaterial(
-        name=bsdf.name,
-        line=line,
-        distribution=bsdf.distribution,
-        value=_value(values),
-        result=_value(results),
-        rmse=rmse,
-        notes=tuple(dict.fromkeys(notes)),
+        bsdf.name,
+        line,
+        bsdf.distribution,
+        _value(values),
+        _value(results),
+        rmse,
+        tuple(dict.fromkeys(notes)) if notes else (),
     )
 
 
 def _worst(table: ValueTable, values: list[float]) -> float:
     """Return the largest error; NaN if one is not known."""
     errors = [table.rmse.get(value, math.nan) for value in values]
+    if len(errors) == 1:
+        return errors[0]
     return math.nan if any(map(math.isnan, errors)) else max(errors)
 
 

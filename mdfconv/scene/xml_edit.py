@@ -21,10 +21,13 @@ _BLANK = rb"[ \t\r\n]"
 _ATTRIBUTE = rb"(?:[ \t\r\n]+[^ \t\r\n=/>]+[ \t\r\n]*=[ \t\r\n]*(?:\"[^\"]*\"|'[^']*'))"
 _NAME = rb"<[^ \t\r\n/>]+"
 _VALUE = re.compile(
-    _NAME + _ATTRIBUTE + rb"*?([ \t\r\n]+value[ \t\r\n]*=[ \t\r\n]*)(\"[^\"]*\"|'[^']*')"
+    _NAME + _ATTRIBUTE + rb"*?[ \t\r\n]+value[ \t\r\n]*=[ \t\r\n]*(?:\"([^\"]*)\"|'([^']*)')"
 )
 # What ends it: the blanks before a slash, the slash, and the bracket.
 _START_TAG = re.compile(_NAME + _ATTRIBUTE + rb"*([ \t\r\n]*(/?)>)")
+_INDENTATION = re.compile(rb"[\r\n]([ \t]+)<")
+# Where the usual indentation is looked for, anew for each element.
+_FIRST_LINES = 4096
 _QUOTE = re.compile(rb"[^\"']*([\"'])")
 
 
@@ -131,11 +134,17 @@ def _refuse_entity(name: str, *_: Any) -> None:
     raise MdfconvError(f"the file declares the entity {name}, and entities are not read")
 
 
-def value_place(data: bytes, element: Element) -> slice:
-    """Return where the attribute ``value``, which an element has, stands in the file."""
+def value_place(data: bytes, element: Element) -> tuple[int, int]:
+    """Return where the attribute ``value``, which an element has, starts and ends in the file.
+
+    The blanks around it do not belong to it.
+    """
     match = _VALUE.match(data, element.start)
     assert match is not None
-    return slice(match.start(2) + 1, match.end(2) - 1)
+    which = match.lastindex or 1
+    start, end = match.span(which)
+    text = match[which]
+    return start + len(text) - len(text.lstrip()), end - len(text) + len(text.rstrip())
 
 
 def _start_tag(data: bytes, element: Element) -> re.Match[bytes]:
@@ -151,7 +160,7 @@ def attribute_text(value: str) -> bytes:
 
 def children_insertion(
     data: bytes, element: Element, children: list[tuple[str, dict[str, str]]]
-) -> tuple[slice, bytes]:
+) -> tuple[int, int, bytes]:
     """Return the edit that puts empty elements before the children of an element.
 
     They stand as its first child does, or if it has none a step further in than itself, and have
@@ -168,8 +177,8 @@ def children_insertion(
 
     Returns
     -------
-    slice, bytes
-        What to replace, and by what.
+    int, int, bytes
+        Where what is to be replaced starts and ends, and what takes its place.
     """
     tag = _start_tag(data, element)
     ending = b"/>"
@@ -186,9 +195,9 @@ def children_insertion(
     mark = quote[1] if quote else b'"'
     inner = b"".join(gap + _empty_element(*child, mark, ending) for child in children) + closing
     if not tag[2]:
-        return slice(tag.end(), tag.end()), inner
+        return tag.end(), tag.end(), inner
     name = element.tag.encode()
-    return slice(*tag.span(1)), b">" + inner + b"</" + name + b">"
+    return *tag.span(1), b">" + inner + b"</" + name + b">"
 
 
 def _empty_element(tag: str, attributes: dict[str, str], quote: bytes, end: bytes) -> bytes:
@@ -215,23 +224,24 @@ def _step(data: bytes, blanks: bytes) -> bytes:
     indentation = blanks.lstrip(b"\r\n")
     if indentation.startswith(b"\t"):
         return b"\t"
-    first = re.search(rb"[\r\n]([ \t]+)<", data)
+    first = _INDENTATION.search(data, 0, _FIRST_LINES)
     return first[1] if first else b"    "
 
 
-def apply_edits(data: bytes, edits: Mapping[int, tuple[slice, bytes]]) -> bytes:
+def apply_edits(data: bytes, edits: Mapping[int, tuple[int, bytes]]) -> bytes:
     """Return a file with pieces of it replaced.
 
     Parameters
     ----------
     data : bytes
         The file.
-    edits : mapping of int to (slice, bytes)
-        What to replace, and by what, by where it starts; none overlap.
+    edits : mapping of int to (int, bytes)
+        From where a piece starts to where it ends, and what takes its place; none overlap.
     """
-    pieces, position = [], 0
+    pieces: list[bytes] = []
+    position = 0
     for start in sorted(edits):
-        where, new = edits[start]
-        pieces += [data[position : where.start], new]
-        position = where.stop
+        end, new = edits[start]
+        pieces += (data[position:start], new)
+        position = end
     return b"".join([*pieces, data[position:]])

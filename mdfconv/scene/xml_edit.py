@@ -62,6 +62,7 @@ class Lines:
     def __init__(self, data: bytes) -> None:
         self._data = data
         self._position, self._line = 0, 1
+        self._returns = b"\r" in data
 
     def __call__(self, position: int) -> int:
         """Return the line of a byte that does not end one."""
@@ -69,7 +70,9 @@ class Lines:
             self._position, self._line = 0, 1
         part = self._position, position
         count = self._data.count
-        self._line += count(b"\n", *part) + count(b"\r", *part) - count(b"\r\n", *part)
+        self._line += count(b"\n", *part)
+        if self._returns:
+            self._line += count(b"\r", *part) - count(b"\r\n", *part)
         self._position = position
         return self._line
 

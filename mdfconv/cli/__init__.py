@@ -24,6 +24,7 @@ _COMMANDS = (
     "formula",
     "mtl",
     "gltf",
+    "mitsuba",
     "texture",
     "light",
     "list",

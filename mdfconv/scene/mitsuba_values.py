@@ -11,7 +11,7 @@ from mdfconv.conversion.endpoint import Endpoint, endpoints
 from mdfconv.conversion.methods import default_method
 from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions.evaluation import Array
-from mdfconv.fitting.interpolation import WORTH_IT, interpolated
+from mdfconv.fitting.interpolation import errors_of_many
 from mdfconv.fitting.metrics import Metric
 
 # From parameters of the source to those of the target, NaN where there are none.
@@ -88,7 +88,7 @@ def _table(
 
     answered = ~np.isnan(result)
     keys, found = values[answered].tolist(), result[answered].tolist()
-    rmse = _of_many(errors, parameter[answered]).tolist()
+    rmse = errors_of_many(errors, parameter[answered]).tolist()
     return ValueTable(
         frozenset(values[legal].tolist()),
         dict(zip(keys, found, strict=True)),
@@ -100,16 +100,3 @@ def _answers(rule: _Rule, parameter: Array, target: Endpoint) -> Array:
     with np.errstate(all="ignore"):
         result = rule(parameter)
     return np.where(target.distribution.parameter.accepts(result), result, np.nan)
-
-
-def _of_many(function: Callable[[Array], Array], parameter: Array) -> Array:
-    """Return a function of parameters, of many by cubics through its values at some."""
-    if parameter.size < WORTH_IT:
-        return function(parameter)
-    low, high = parameter.min(), parameter.max()
-    (found,), _ = interpolated(
-        lambda x: function(np.clip(np.exp(x), low, high))[None], np.log(parameter)
-    )
-    rest = np.isnan(found)
-    found[rest] = function(parameter[rest])
-    return found

@@ -307,3 +307,11 @@ def test_rules_that_are_none(rule, words):
 def test_docstring_example():
     found = doctest.testmod(texture_module)
     assert (found.failed, found.attempted > 0) == (0, True)
+
+
+def test_what_is_too_rough_for_the_target_is_the_roughest():
+    """pbrt-v3's roughness is beyond GGX from 0.45 on: not a mirror because it is below a half."""
+    texels = np.linspace(0, 1, 101, dtype=np.float32)[None]
+    converted = convert_texture(texels, TextureRule("ggx:pbrt-v3", "ggx:roughness"))
+    assert np.all(np.diff(converted[0]) >= 0)
+    assert converted[0, 50:].min() == 1

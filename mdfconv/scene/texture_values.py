@@ -95,7 +95,8 @@ class ValueConverter:
         with np.errstate(invalid="ignore"):
             outcome[np.abs(result - value) > _ROUNDING] = Outcome.CLAMPED
         if not answered.all():
-            smooth = self._roughness(clipped) < self._middle
+            with np.errstate(invalid="ignore"):
+                smooth = self._roughness(clipped) < self._middle
             ends = np.where(smooth, self._smoothest_answer, 1 - self._smoothest_answer)
             value = np.where(legal, value, ends)
             outcome[~legal] = np.where(smooth, Outcome.MIRROR, Outcome.UNIFORM)[~legal]

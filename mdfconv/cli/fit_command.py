@@ -322,9 +322,16 @@ def _report(
     from mdfconv.reports.fit_report import report_files
 
     _, rows = _table([analysis], Format.table, separate)
-    texts = [{name: str(value) for name, value in row.items()} for row in rows]
+    texts = [{name: _cell(value) for name, value in row.items()} for row in rows]
     line = join(["mdfconv", *sys.argv[1:]])
     return report_files(report_of(analysis, texts, line, logarithms=logarithms), path)
+
+
+def _cell(value: Any) -> str:
+    """Return a cell of the report's table."""
+    if isinstance(value, bool):
+        return "yes" if value else ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _tell(analysis: Analysis, tolerance: float, *, named: bool) -> None:

@@ -36,9 +36,9 @@ _NARROWEST, _WIDEST, _CANDIDATES, _GAMMAS = 1e-3, 10.0, 40, 5
 # F₀ of a dielectric and of a dark metal, between which a search finds its way.
 _STARTS = (0.04, 0.5)
 _LEAST_F0, _MOST_F0 = 1e-4, 1 - 1e-4
-# Of so many samples a scan, and a fit near which that of all lies, is made.
-_SCANNED, _SOME = 2_000, 20_000
-_STEPS, _SMALLEST_STEP = 3, 1e-6
+# Of so many samples a scan is made, and of so many a fit, from which some steps lead to that of
+# all.
+_SCANNED, _SOME, _STEPS, _SMALLEST_STEP = 600, 3_000, 4, 1e-6
 _SEED = 0
 _DIFFERENCE = 1e-5
 _INSIDE = 1e-9
@@ -345,13 +345,17 @@ class _Problem:
         return sorted(starts, key=self.cost)[:3]
 
     def descend(self, point: Array) -> Array:
-        """Return the minimum near a point: a few Gauss-Newton steps."""
+        """Return the minimum near a point: a few Gauss-Newton steps, or a search if they rise."""
+        start, before = point, np.inf
         for _ in range(_STEPS):
             lobe, slopes = self._lobe(point), self._slopes(point)
             residual, gain, _, scale = self._projection(lobe)
+            cost = float(np.sum(np.square(residual)))
+            if cost > before * (1 + _SMALLEST_STEP):
+                return self.refine(start)
             slope = projected_slope(lobe, slopes, gain, scale)
             step = np.linalg.lstsq(slope.T @ slope, slope.T @ residual.ravel(), rcond=None)[0]
-            point = np.clip(point - step, *self._bounds)
+            point, before = np.clip(point - step, *self._bounds), cost
             if np.abs(step).max() < _SMALLEST_STEP:
                 break
         return point

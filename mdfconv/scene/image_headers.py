@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import struct
 import zlib
 from math import ceil
@@ -11,6 +10,8 @@ from pathlib import Path
 # Chunks that say how a PNG's texels are meant, and stay true when some are converted.
 _PNG_KEPT = (b"cHRM", b"gAMA", b"iCCP", b"sRGB", b"cICP", b"pHYs")
 _PNG_HEADER = 33  # bytes, of the signature and the first chunk
+_PNG_END = b"IEND\xaeB`\x82"
+_TGA_END = b"TRUEVISION-XFILE.\0"
 _PALETTE = 3
 _LINEAR_GAMMA = 100000
 _LARGEST_PROFILE = 1 << 26
@@ -34,7 +35,12 @@ class PngHeader:
     Parameters
     ----------
     path : Path
-        The file, which may be damaged.
+        The file.
+
+    Raises
+    ------
+    ValueError
+        If a chunk is damaged.
     """
 
     def __init__(self, path: Path) -> None:
@@ -44,11 +50,13 @@ class PngHeader:
             file.seek(8)
             while len(head := file.read(8)) == 8 and head[4:] not in (b"IDAT", b"IEND"):
                 length = int.from_bytes(head[:4])
-                self._chunks[head[4:]] = file.read(min(length, size))
-                file.seek(4, os.SEEK_CUR)
+                data = file.read(min(length, size))
+                if file.read(4) != zlib.crc32(head[4:] + data).to_bytes(4):
+                    raise ValueError(f"the sum of the chunk {head[4:].decode('latin-1')} is wrong")
+                self._chunks[head[4:]] = data
 
-    def reason(self) -> tuple[str, str]:
-        """Return why it is no texture, and what helps; empty if it is one."""
+    def reason(self) -> tuple[str, str] | None:
+        """Return why it is no texture, and what helps; None if it is one."""
         *_, bits, kind = struct.unpack(">IIBB", self._chunks.get(b"IHDR", bytes(10))[:10])
         if kind == _PALETTE:
             return "has a palette: its texels are indices, not values", "save it as grey or RGB"
@@ -58,7 +66,7 @@ class PngHeader:
             return "makes one value transparent, which would be another", "save it with alpha"
         if b"acTL" in self._chunks:
             return "holds several pictures, of which only one would be kept", "split it"
-        return "", ""
+        return None
 
     def gamma(self) -> str:
         """Return what the file says of a gamma, in words; empty if it says none."""
@@ -73,7 +81,10 @@ class PngHeader:
         libpng leaves out those that it finds fault with, of colours in a grey picture for one.
         """
         packed = self._chunks.get(b"iCCP", b"").partition(b"\0")[2][1:]
-        return zlib.decompressobj().decompress(packed, _LARGEST_PROFILE) if packed else b""
+        try:
+            return zlib.decompressobj().decompress(packed, _LARGEST_PROFILE)
+        except zlib.error:
+            return b""
 
     def kept(self) -> bytes:
         """Return the chunks that belong into the converted file."""
@@ -88,16 +99,39 @@ def png_chunk(name: bytes, data: bytes) -> bytes:
 
 
 def replace_chunks(path: Path, chunks: bytes) -> None:
-    """Give a PNG file these chunks instead of those between its header and its texels."""
+    """Give a PNG file these chunks instead of those between its header and its texels.
+
+    Raises
+    ------
+    OSError
+        If it is not whole, of which OpenImageIO says nothing where the disk is full.
+    """
     content = path.read_bytes()
-    texels = _PNG_HEADER
-    while content[texels + 4 : texels + 8] != b"IDAT":
-        texels += 12 + int.from_bytes(content[texels : texels + 4])
+    texels, end = 0, 8
+    while len(content) >= end + 12 and not content[:end].endswith(_PNG_END):
+        if content[end + 4 : end + 8] == b"IDAT":
+            texels = texels or end
+        end += 12 + int.from_bytes(content[end : end + 4])
+    if not texels or not content.endswith(_PNG_END) or len(content) != end:
+        raise OSError("it could not be written as a whole")
     path.write_bytes(content[:_PNG_HEADER] + chunks + content[texels:])
 
 
-def tiff_reason(path: Path) -> tuple[str, str]:
-    """Return why a TIFF is no texture, and what helps; empty if it is one.
+def check_tga(path: Path, texels: int) -> None:
+    """Check that an uncompressed TGA of so many bytes is whole.
+
+    Raises
+    ------
+    OSError
+        If it is not, of which OpenImageIO says nothing where the disk is full.
+    """
+    content = path.read_bytes()
+    if len(content) < texels or not content.endswith(_TGA_END):
+        raise OSError("it could not be written as a whole")
+
+
+def tiff_reason(path: Path) -> tuple[str, str] | None:
+    """Return why a TIFF is no texture, and what helps; None if it is one.
 
     libtiff takes what follows in the file for rows that lack, so these are looked for.
 
@@ -118,7 +152,7 @@ def tiff_reason(path: Path) -> tuple[str, str]:
         return "has channels that are multiplied by alpha", "save it with unassociated alpha"
     if _lacks(tags, bits[0], path.stat().st_size):
         raise ValueError("rows are missing")
-    return "", ""
+    return None
 
 
 def _lacks(tags: dict[int, tuple[int, ...]], bits: int, size: int) -> bool:
@@ -174,10 +208,10 @@ def _tiff_tags(path: Path) -> dict[int, tuple[int, ...]]:
     return tags
 
 
-def tga_reason(path: Path) -> tuple[str, str]:
-    """Return why a TGA is no texture, and what helps; empty if it is one."""
+def tga_reason(path: Path) -> tuple[str, str] | None:
+    """Return why a TGA is no texture, and what helps; None if it is one."""
     with path.open("rb") as file:
         start = file.read(18)
     if len(start) == 18 and start[16] in _TGA_BITS.get(start[2], ()):
-        return "", ""
+        return None
     return "is not of 8 bits a channel, grey, RGB or RGBA", "save it so, without a palette"

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mdfconv.errors import MdfconvError
 from mdfconv.scene.image_headers import (
     PngHeader,
+    check_tga,
     png_chunk,
     replace_chunks,
     tga_reason,
@@ -229,17 +230,17 @@ class Picture:
     def profile(self) -> bytes:
         """Return the colour profile; empty if there is none."""
         if self.form is Form.png:
-            with reading(self.path):
-                return PngHeader(self.path).profile()
+            return PngHeader(self.path).profile()
         profile = self.spec.getattribute("ICCProfile")
         return b"" if profile is None else np.asarray(profile).tobytes()
 
     def remark(self) -> str:
         """Return what the user must know of how the texels were taken; empty if nothing."""
-        found = PngHeader(self.path).gamma() if self.form is Form.png else ""
-        if self.profile():
-            name = self.spec.get_string_attribute("ICCProfile:profile_description")
-            found = f"a colour profile ({name})" if name else "a colour profile"
+        with reading(self.path):
+            found = PngHeader(self.path).gamma() if self.form is Form.png else ""
+            if self.profile():
+                name = self.spec.get_string_attribute("ICCProfile:profile_description")
+                found = f"a colour profile ({name})" if name else "a colour profile"
         return found and (
             f"{self.path} has {found}, which is not for data: its texels were taken as they are"
         )
@@ -258,41 +259,44 @@ def open_picture(
     """
     import OpenImageIO
 
-    with reading(path):
-        reason = _REASONS[form](path) if form in _REASONS else ("", "")
-    if any(reason):
-        raise MdfconvError(f"{path} {reason[0]}", reason[1])
     config = OpenImageIO.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)  # or it would multiply by alpha
     with reading(path):
+        _refuse(path, _REASONS[form](path) if form in _REASONS else None)
         file = OpenImageIO.ImageInput.open(str(path), config)
         fault = OpenImageIO.geterror()
         if file is None or file.format_name() != _FORMATS[form]:
             raise ValueError(fault)
     try:
-        picture = Picture(path, form, file, upright=upright)
-        _check_size(picture, max_pixels)
-        reason = _reason(picture, lossy=lossy)
-        if not any(reason) and (file.seek_subimage(1, 0) or file.seek_subimage(0, 1)):
-            reason = "holds several pictures, of which only one would be kept", "split it"
-        file.seek_subimage(0, 0)
-        file.geterror()
-        if any(reason):
-            raise MdfconvError(f"{path} {reason[0]}", reason[1])
+        with reading(path):
+            picture = Picture(path, form, file, upright=upright)
+            _check_size(picture, max_pixels)
+            _refuse(path, _reason(picture, lossy=lossy))
+            if file.seek_subimage(1, 0) or file.seek_subimage(0, 1):
+                _refuse(
+                    path, ("holds several pictures, of which only one would be kept", "split it")
+                )
+            file.seek_subimage(0, 0)
+            file.geterror()
         yield picture
     finally:
         file.close()
 
 
-_REASONS: dict[Form, Callable[[Path], tuple[str, str]]] = {
+def _refuse(path: Path, reason: tuple[str, str] | None) -> None:
+    if reason:
+        raise MdfconvError(f"{path} {reason[0]}", reason[1])
+
+
+_REASONS: dict[Form, Callable[[Path], tuple[str, str] | None]] = {
     Form.png: lambda path: PngHeader(path).reason(),
     Form.tiff: tiff_reason,
     Form.tga: tga_reason,
 }
 
 
-def _reason(picture: Picture, *, lossy: bool) -> tuple[str, str]:
-    """Return why an open picture cannot be taken, and what helps; empty if it can."""
+def _reason(picture: Picture, *, lossy: bool) -> tuple[str, str] | None:
+    """Return why an open picture cannot be taken, and what helps; None if it can."""
     spec = picture.spec
     space = spec.get_string_attribute("tiff:ColorSpace")
     if spec.deep:
@@ -309,7 +313,7 @@ def _reason(picture: Picture, *, lossy: bool) -> tuple[str, str]:
         return "counts from white (0) to black", "save it with black as zero"
     if picture.form is Form.tiff and not lossy and not _is_lossless(spec):
         return "is compressed with losses, which has altered the values", ACCEPT_LOSSES
-    return "", ""
+    return None
 
 
 def _is_lossless(spec: Any) -> bool:
@@ -382,7 +386,8 @@ def written(
     import OpenImageIO
 
     with _staged(output) as beside:
-        spec = _output_spec(picture, form, dtype)
+        with reading(picture.path):  # whose texts may be none
+            spec = _output_spec(picture, form, dtype)
         file: Any = OpenImageIO.ImageOutput.create(_FORMATS[form])
         if not file.open(str(beside), spec):
             raise OSError(file.geterror())
@@ -409,6 +414,8 @@ def written(
             raise OSError(file.geterror())
         if form is Form.png:
             replace_chunks(beside, _png_chunks(picture))
+        if form is Form.tga:
+            check_tga(beside, spec.image_bytes())
 
 
 def _output_spec(picture: Picture, form: Form, dtype: np.dtype[Any]) -> Any:
@@ -428,7 +435,7 @@ def _output_spec(picture: Picture, form: Form, dtype: np.dtype[Any]) -> Any:
         )
         spec.channelnames, spec.alpha_channel = given.channelnames, given.alpha_channel
         spec.attribute("oiio:UnassociatedAlpha", 1)
-        spec.attribute("compression", "rle" if form is Form.tga else "zip")
+        spec.attribute("compression", "none" if form is Form.tga else "zip")
     if not given.get_string_attribute("DateTime"):
         spec.attribute("DateTime", "")  # or it would be now
     if form is Form.png:

@@ -167,7 +167,7 @@ def _convert(
 def _with_option(problem: str) -> str:
     """Return what is wrong with a material, with the option that helps."""
     from mdfconv.scene.gltf import HAS_TEXTURE
-    from mdfconv.scene.image_picture import ACCEPT_LOSSES
+    from mdfconv.scene.images import ACCEPT_LOSSES
 
     if problem == HAS_TEXTURE:
         return f"{problem}: --textures converts it"

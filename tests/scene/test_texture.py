@@ -1,6 +1,7 @@
 """Textures as arrays: what each texel becomes, by which rule, and what rounding leaves."""
 
 import doctest
+import tracemalloc
 import warnings
 
 import numpy as np
@@ -253,6 +254,17 @@ def test_dither_against_the_loop():
     found = ErrorDiffusion(53)(picture)
     # Where a sum in single precision rounds the other way, the neighbours follow.
     assert np.mean(found != one_by_one(picture.astype(float))) < 0.01
+
+
+@pytest.mark.parametrize("shape", [(70000, 1), (3000, 2), (1, 70000)])
+def test_dither_of_narrow_pictures(shape):
+    tracemalloc.start()
+    levels = np.full(shape, 100.4, np.float32)
+    found = ErrorDiffusion(shape[1])(levels)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 64 * levels.size + 4e6
+    assert set(np.unique(found)) == {100, 101}
 
 
 def test_dither_shows_what_rounding_hides():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Generic, TypeVar
 
 from mdfconv.errors import MdfconvError
@@ -29,9 +29,27 @@ class Registry(Generic[Item]):
         self.kind = kind
         self._items: dict[str, Item] = {}
         self._aliases: dict[str, str] = {}
+        self._meant: dict[str, str] = {}
 
-    def add(self, name: str, item: Item, aliases: Sequence[str] = ()) -> None:
+    def add(
+        self,
+        name: str,
+        item: Item,
+        aliases: Sequence[str] = (),
+        meant_by: Mapping[str, str] | None = None,
+    ) -> None:
         """Add an item.
+
+        Parameters
+        ----------
+        name : str
+            Its name.
+        item : object
+            The item.
+        aliases : sequence of str
+            Other names of it.
+        meant_by : mapping of str to str
+            From words that are no names to what who writes them may mean: a hint.
 
         Raises
         ------
@@ -51,6 +69,7 @@ class Registry(Generic[Item]):
                 raise MdfconvError(f"the {self.kind} '{word}' exists already")
         self._items[name] = item
         self._aliases |= dict.fromkeys((name, *aliases), name)
+        self._meant |= meant_by or {}
 
     def __getitem__(self, name: str) -> Item:
         """Return the item with a name or alias; raise `MdfconvError` if there is none."""
@@ -58,7 +77,8 @@ class Registry(Generic[Item]):
             raise MdfconvError(f"a {self.kind} is named by a string, not {name!r}")
         key = _key(name)
         if key not in self._aliases:
-            raise unknown_name(self.kind, name, list(self._aliases))
+            meant = [self._meant[key]] if key in self._meant else []
+            raise unknown_name(self.kind, name, list(self._aliases), meant)
         return self._items[self._aliases[key]]
 
     def __iter__(self) -> Iterator[Item]:
@@ -74,7 +94,9 @@ def _key(name: str) -> str:
     return name.strip().lower().translate(_SEPARATORS)
 
 
-def unknown_name(kind: str, name: str, known: Sequence[str]) -> MdfconvError:
+def unknown_name(
+    kind: str, name: str, known: Sequence[str], meant: Sequence[str] = ()
+) -> MdfconvError:
     """Return the error for a name that is not known, with the nearest ones that are.
 
     Parameters
@@ -85,9 +107,11 @@ def unknown_name(kind: str, name: str, known: Sequence[str]) -> MdfconvError:
         The name as the user wrote it.
     known : sequence of str
         Every name that would have been accepted.
+    meant : sequence of str
+        What the name is known to be taken for, if it is.
     """
     from difflib import get_close_matches
 
-    near = get_close_matches(name.lower(), known, n=3, cutoff=0.5)
+    near = meant or get_close_matches(name.lower(), known, n=3, cutoff=0.5)
     hint = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known)}"
     return MdfconvError(f"unknown {kind} '{name}'", hint)

@@ -36,3 +36,11 @@ def test_what_is_taken_is_refused():
             things.add(words[0], 2, *words[1:])
     with pytest.raises(MdfconvError, match="are a sequence"):
         things.add("two", 2, "abc")
+
+
+def test_a_word_that_is_no_name_offers_what_it_means():
+    things = Registry("thing")
+    things.add("one-thing", 1, meant_by={"first-of-all": "one-thing:first"})
+    for word in ("first-of-all", "First of_all"):
+        with pytest.raises(MdfconvError, match="did you mean one-thing:first"):
+            things[word]

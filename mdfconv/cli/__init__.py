@@ -1,12 +1,12 @@
 """The command line.
 
-A new command is a module that defines ``command``, and one line in `_COMMANDS`. A module is
+A new command is a module that defines ``command``, and its name in `_PANELS`. A module is
 imported when its command runs, so that no command pays for another's imports.
 """
 
 from __future__ import annotations
 
-import os
+import re
 import sys
 from difflib import get_close_matches
 from importlib import import_module
@@ -16,34 +16,27 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from mdfconv import __version__
+from mdfconv.cli.completion import whole_words
+from mdfconv.cli.numbers import percent_hint
+from mdfconv.cli.process import run
 from mdfconv.errors import MdfconvError
 from mdfconv.registry import unknown_name
 
-_COMMANDS = (
-    "convert",
-    "formula",
-    "mtl",
-    "gltf",
-    "mitsuba",
-    "texture",
-    "light",
-    "list",
-    "fit",
-    "fit-table",
-    "plot-error",
-    "compare",
-    "furnace",
-    "fresnel",
-    "report",
-    "bench",
-    "recommend",
-    "stability",
-)
+# As the help shows them: what is asked every day first.
+_PANELS = {
+    "Commands": ("convert", "mtl", "gltf", "mitsuba", "texture", "formula", "fit", "list"),
+    "Studies": (
+        "fit-table", "plot-error", "compare", "light", "furnace", "fresnel", "report",
+    ),
+    "Audits": ("bench", "stability", "recommend"),
+}  # fmt: skip
+_COMMANDS = {name: panel for panel, names in _PANELS.items() for name in names}
 
 # A value may be negative, which looks like an option: `_Command` sorts out the real typos.
 _CONTEXT = {"help_option_names": ["-h", "--help"], "ignore_unknown_options": True}
-# Typer exports BadParameter but not its base, the family of all mistakes in the arguments.
-_UsageError: type[Any] = typer.BadParameter.__mro__[1]
+
+# How Typer says that a word is no number.
+_NO_NUMBER = re.compile(r"'(.*)' is not a valid")
 
 
 class _Command(TyperCommand):
@@ -61,7 +54,14 @@ class _Command(TyperCommand):
                 near = get_close_matches(name, known, n=1)
                 hint = f"; did you mean {near[0]}?" if near else ""
                 raise MdfconvError(f"no such option: {name}{hint}")
-        return super().parse_args(ctx, args)
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as error:
+            wrong = _NO_NUMBER.match(error.message)
+            hint = percent_hint(wrong[1]) if wrong else ""
+            if hint:
+                error.message += f" {hint[0].upper()}{hint[1:]}"
+            raise
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -94,7 +94,10 @@ class _LazyGroup(TyperGroup):
             raise unknown_name("command", name, list(_COMMANDS))
         module = import_module(f"{__name__}.{name.replace('-', '_')}_command")
         single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-        single.command(name, cls=_Command, context_settings=_CONTEXT)(module.command)
+        panel = _COMMANDS[name]
+        single.command(name, cls=_Command, context_settings=_CONTEXT, rich_help_panel=panel)(
+            module.command
+        )
         return typer.main.get_command(single)
 
 
@@ -128,33 +131,11 @@ def _root(
 
 
 def main() -> None:
-    """Run the command line and exit: 0 for an answer, 2 for a request that has none."""
-    for stream in (sys.stdout, sys.stderr):
-        # A terminal that cannot show α shows ? instead of a traceback.
-        if stream is not None:
-            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
-    try:
-        if sys.stdout is None:
-            raise MdfconvError("standard output is closed")
-        status = app(standalone_mode=False)
-        sys.stdout.flush()
-    except MdfconvError as error:
-        status = _refuse(str(error))
-    except _UsageError as error:
-        status = _refuse(error.format_message())
-    except typer.Abort:
-        status = 130
-    except BrokenPipeError:
-        # The reader has what it wanted; keep the interpreter from flushing into the pipe again.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        status = 0
-    except OSError as error:
-        # Standard output failed (a full disk); what is left in its buffer would fail again.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        status = _refuse(f"cannot write the output: {error.strerror}")
-    sys.exit(status or 0)
+    """Run the command line and exit with the status that `process` has for what happened."""
+    sys.exit(run(_answer))
 
 
-def _refuse(message: str) -> int:
-    typer.echo(f"mdfconv: {' '.join(message.split())}", err=True)
-    return 2
+def _answer() -> int | None:
+    with whole_words():
+        status: int | None = typer.main.get_command(app).main(standalone_mode=False)
+    return status

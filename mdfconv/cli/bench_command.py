@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli import completion
 from mdfconv.cli.options import Format, FormatOption, PngOption
 from mdfconv.cli.outputs import check_outputs, write_named
 from mdfconv.cli.tables import form_of, progress, table_text, write_table
@@ -23,7 +24,12 @@ _REFERENCE, _PARAMETERS = "beckmann", (0.2, 0.05)
 
 def command(
     reference: Annotated[
-        str, typer.Option(metavar="MDF", help="Distribution that the others take the place of.")
+        str,
+        typer.Option(
+            metavar="MDF",
+            autocompletion=completion.endpoints,
+            help="Distribution that the others take the place of.",
+        ),
     ] = _REFERENCE,
     parameter: Annotated[
         list[float] | None,
@@ -34,10 +40,22 @@ def command(
         ),
     ] = None,
     source: Annotated[
-        str, typer.Option("--from", metavar="MDF", help="Source of the timed conversions.")
+        str,
+        typer.Option(
+            "--from",
+            metavar="MDF",
+            autocompletion=completion.distributions,
+            help="Source of the timed conversions.",
+        ),
     ] = _REFERENCE,
     target: Annotated[
-        str, typer.Option("--to", metavar="MDF", help="Target of the timed conversions.")
+        str,
+        typer.Option(
+            "--to",
+            metavar="MDF",
+            autocompletion=completion.distributions,
+            help="Target of the timed conversions.",
+        ),
     ] = "ggx",
     quick: Annotated[
         bool,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli import completion
 from mdfconv.cli.options import (
     DpiOption,
     FolderOption,
@@ -58,7 +59,10 @@ def command(
     mdf: MdfOption = None,
     method: MethodOption = None,
     metric: Annotated[
-        str | None, typer.Option(metavar="METRIC", help="What --method fit keeps.")
+        str | None,
+        typer.Option(
+            metavar="METRIC", autocompletion=completion.metrics, help="What --method fit keeps."
+        ),
     ] = None,
     exposure: Annotated[
         float,
@@ -77,6 +81,7 @@ def command(
         str | None,
         typer.Option(
             metavar="NAME",
+            autocompletion=completion.materials,
             help="What is reflected: gold, silver, copper, nickel, iron or chrome, in colour; "
             "acrylic, polycarbonate, polystyrene, polyethylene, polypropylene or pvc.",
         ),

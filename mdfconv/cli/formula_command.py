@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli import completion
 from mdfconv.cli.options import (
     ExposureOption,
     FixedGammaOption,
@@ -47,7 +48,13 @@ def command(
     gamma: FixedGammaOption = None,
     specular: SpecularOption = None,
     language: Annotated[
-        str, typer.Option("--lang", metavar="LANG", help="glsl, hlsl, c, python or latex.")
+        str,
+        typer.Option(
+            "--lang",
+            metavar="LANG",
+            autocompletion=completion.languages,
+            help="glsl, hlsl, c, python or latex.",
+        ),
     ] = "glsl",
     every: Annotated[
         bool,

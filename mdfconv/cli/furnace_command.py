@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli import completion
 from mdfconv.cli.options import Format, FormatOption, OutputOption, PngOption
 from mdfconv.cli.outputs import check_outputs, write_named
 from mdfconv.cli.tables import write_table
@@ -29,6 +30,7 @@ def command(
         str,
         typer.Option(
             metavar="BRDF",
+            autocompletion=completion.furnace_brdfs,
             help="phong, modified-phong, ggx, beckmann, smoothie, smoothie-approx or "
             "ashikhmin-shirley.",
         ),
@@ -37,6 +39,7 @@ def command(
         str | None,
         typer.Option(
             metavar="NAME",
+            autocompletion=completion.normalizers,
             help="Of modified-phong: usual (the default), arvo (integer exponents) or "
             "mallett-yuksel.",
         ),
@@ -46,6 +49,7 @@ def command(
         typer.Option(
             "--g",
             metavar="G",
+            autocompletion=completion.maskings,
             help="Of ggx and beckmann: correlated (the default), separable, v-cavity, ksk or none.",
         ),
     ] = None,

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mdfconv.cli import completion
+from mdfconv.cli.numbers import percent_hint
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
@@ -27,31 +29,12 @@ class Format(StrEnum):
     markdown = "markdown"
 
 
-def _distributions(incomplete: str) -> list[str]:
-    from mdfconv.distributions import list_distributions
-
-    names = [mdf.name for mdf in list_distributions()]
-    return [name for name in names if name.startswith(incomplete)]
-
-
-def _methods(incomplete: str) -> list[str]:
-    from mdfconv.conversion import list_methods
-
-    return [method.name for method in list_methods() if method.name.startswith(incomplete)]
-
-
-def _metrics(incomplete: str) -> list[str]:
-    from mdfconv.fitting.metrics import list_metrics
-
-    return [name for name in list_metrics() if name.startswith(incomplete)]
-
-
 FromOption = Annotated[
     str,
     typer.Option(
         "--from",
         metavar="MDF",
-        autocompletion=_distributions,
+        autocompletion=completion.endpoints,
         help="Distribution that the values belong to, such as beckmann, ggx or blinn-phong; "
         "ggx:roughness and ggx:glossiness name stored forms of α, blinn-phong:reflected the older "
         "Phong exponent.",
@@ -62,7 +45,7 @@ ToOption = Annotated[
     typer.Option(
         "--to",
         metavar="MDF",
-        autocompletion=_distributions,
+        autocompletion=completion.targets,
         help="Distribution to convert to, as for --from.",
     ),
 ]
@@ -71,7 +54,7 @@ MdfOption = Annotated[
     typer.Option(
         "--mdf",
         metavar="MDF",
-        autocompletion=_distributions,
+        autocompletion=completion.distributions,
         help="Only this distribution; repeatable.",
     ),
 ]
@@ -80,7 +63,7 @@ MethodOption = Annotated[
     typer.Option(
         "--method",
         metavar="METHOD",
-        autocompletion=_methods,
+        autocompletion=completion.methods,
         help="closed-form (keeps the lobe's shape, approximately), half-angle, ward, peak, "
         "fit: exact, under the metric, or fast: the same from stored polynomials. With --metric "
         "alone the fit, by fast where that reaches.",
@@ -89,7 +72,7 @@ MethodOption = Annotated[
 _METRIC = typer.Option(
     "--metric",
     metavar="METRIC",
-    autocompletion=_metrics,
+    autocompletion=completion.metrics,
     help="What a fit keeps, and what errors are taken of: unit (the shape of the lobe), energy "
     "(the light of the sun or a lamp), environment (the light of a natural environment), "
     "light:FILE (that of an environment map) or display (the picture on a screen).",
@@ -220,4 +203,5 @@ def chosen_gamma(text: str | None) -> Gamma:
     try:
         return float(text)
     except ValueError:
-        raise MdfconvError(f"--gamma takes a number or {FREE}, not '{text}'") from None
+        reason = f"--gamma takes a number or {FREE}, not '{text}'"
+        raise MdfconvError(reason, percent_hint(text)) from None

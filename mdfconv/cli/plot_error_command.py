@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli import completion
 from mdfconv.cli.options import (
     DpiOption,
     ExposureOption,
@@ -41,7 +42,12 @@ def command(
     metric: OptionalMetricOption = None,
     exposure: ExposureOption = None,
     reference: Annotated[
-        str, typer.Option(metavar="MDF", help="Distribution that the errors are taken against.")
+        str,
+        typer.Option(
+            metavar="MDF",
+            autocompletion=completion.distributions,
+            help="Distribution that the errors are taken against.",
+        ),
     ] = _REFERENCE,
     mdf: MdfOption = None,
     output: FolderOption = None,

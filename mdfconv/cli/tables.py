@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import typer
 
 from mdfconv.cli.options import Format
+from mdfconv.cli.process import tell as tell
 from mdfconv.distributions.parameter import number_text
 from mdfconv.output.records import Record, cell_text, csv_text, json_text, markdown_text
 
@@ -159,11 +160,6 @@ def progress(description: str, total: int) -> Iterator[Callable[[int], None]]:
     with Progress(console=err, transient=True, disable=not sys.stderr.isatty()) as bar:
         task = bar.add_task(description, total=total)
         yield lambda steps: bar.advance(task, steps)
-
-
-def tell(message: str) -> None:
-    """Write one line to standard error."""
-    typer.echo(f"mdfconv: {message}", err=True)
 
 
 def _flat(cell: Any) -> Any:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from mdfconv.cli import completion
 from mdfconv.cli.options import (
     ExposureOption,
     FixedGammaOption,
@@ -42,12 +43,19 @@ def command(
         typer.Option(
             "--from",
             metavar="MDF:ENCODING",
+            autocompletion=completion.texels,
             help="What the texels are: ggx:alpha, ggx:roughness, ggx:glossiness, likewise "
             "beckmann; blinn-phong:exponent (N / --exponent-max), blinn-phong:log2 (N = 2^(k v)).",
         ),
     ],
     target: Annotated[
-        str, typer.Option("--to", metavar="MDF:ENCODING", help="What they become, as for --from.")
+        str,
+        typer.Option(
+            "--to",
+            metavar="MDF:ENCODING",
+            autocompletion=completion.texels,
+            help="What they become, as for --from.",
+        ),
     ],
     channel: Annotated[
         str | None,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdfconv.distributions import Distribution, distribution
-from mdfconv.distributions.dialects import Specular, dialects_of
+from mdfconv.distributions.dialects import DIALECTS, Specular, dialects_of
 from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.distributions.parameter import Encoding, Parameter
 from mdfconv.errors import MdfconvError
@@ -148,10 +148,23 @@ def endpoint(name: str | Endpoint) -> Endpoint:
     if not isinstance(name, str):
         raise MdfconvError(f"a distribution is named by a string, not {name!r}")
     head, colon, tail = name.partition(":")
-    owner = distribution(head)
+    owner = _owner(head)
     if colon:
         return Endpoint(owner, _encoding(owner, tail))
     return Endpoint(owner, caution=owner.ambiguous.get(head.strip().lower(), ""))
+
+
+def _owner(name: str) -> Distribution:
+    """Return a distribution; an error for the name of an encoding says whose it is."""
+    try:
+        return distribution(name)
+    except MdfconvError:
+        key = name.strip().lower()
+        owners = [owner for dialect in DIALECTS if dialect.name == key for owner in dialect.owners]
+        if not owners:
+            raise
+        meant = [f"{owner}:{key}" for owner in owners]
+        raise unknown_name("distribution", name, [], meant) from None
 
 
 def endpoints(

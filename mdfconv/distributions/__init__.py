@@ -44,7 +44,7 @@ def register(mdf: Distribution) -> None:
     MdfconvError
         If its name or an alias is taken.
     """
-    _REGISTRY.add(mdf.name, mdf, mdf.aliases)
+    _REGISTRY.add(mdf.name, mdf, mdf.aliases, mdf.meant_by)
 
 
 for _module in _MODULES:

@@ -52,6 +52,8 @@ class Distribution(ABC):
         Whether it takes a pair of parameters.
     ambiguous : dict
         From aliases that users mean different things by to a sentence that says what is taken.
+    meant_by : dict
+        From words that are no names, but by which users may mean it, to what they mean.
     scales_with_slope : bool
         Whether the cumulative distribution is a function of tan β over the parameter.
     smith : bool
@@ -73,6 +75,7 @@ class Distribution(ABC):
     functions: ClassVar[tuple[str, ...]] = ("tan",)
     encodings: ClassVar[tuple[Encoding, ...]] = ()
     ambiguous: ClassVar[Mapping[str, str]] = {}
+    meant_by: ClassVar[Mapping[str, str]] = {}
     map_variables: ClassVar[MapVariables | None] = None
     anisotropic: ClassVar[bool] = False
     scales_with_slope: ClassVar[bool] = False

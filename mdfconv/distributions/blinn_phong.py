@@ -41,6 +41,13 @@ class BlinnPhong(Distribution):
         "phong": "phong is taken for Blinn's exponent, of the half vector; that of the reflected "
         "ray, about a quarter, is blinn-phong:reflected"
     }
+    meant_by: ClassVar = {
+        "shininess": "blinn-phong",
+        "specular-exponent": "blinn-phong",
+        "exponent": "blinn-phong",
+        "ns": "blinn-phong",
+        "reflected": "blinn-phong:reflected",
+    }
     unit_formula = "cos^N β"
     normalized_formula = "(N+2)/(2π) cos^N β"
     source = "Phong 1975; Blinn 1977; Lewis 1994"

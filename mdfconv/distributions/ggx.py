@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -53,6 +53,14 @@ class GGX(AnisotropicDistribution):
     scales_with_slope = True
     smith = True
     encodings = (ROUGHNESS, GLOSSINESS)
+    meant_by: ClassVar = {
+        "roughness": "ggx:roughness",
+        "perceptual-roughness": "ggx:roughness",
+        "alpha": "ggx",
+        "glossiness": "ggx:glossiness",
+        "gloss": "ggx:glossiness",
+        "smoothness": "ggx:glossiness",
+    }
     map_variables = MapVariables(
         width=same,
         from_width=same,

@@ -3,10 +3,12 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-import mdfconv
+import mdfconv.cli
+from mdfconv.cli import _PANELS
 from tests.cli.runner import run
 
 
@@ -55,20 +57,24 @@ def test_list():
     assert "{" not in out
 
 
-def test_completion():
-    environment = {"COMP_WORDS": "mdfconv convert --from be", "COMP_CWORD": "3"}
-    # Completion is bound to the name of the installed program, which `python -m` is not.
-    script = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "import sys; sys.argv[0] = 'mdfconv'; from mdfconv.cli import main; main()",
-        ],
-        capture_output=True,
-        env={**environment, "_MDFCONV_COMPLETE": "complete_bash", "PATH": "/usr/bin:/bin"},
-        check=False,
+def test_help_shows_every_command_in_its_panel():
+    out = run("--help")[1]
+    places = [out.index(f"─ {panel} ─") for panel in _PANELS]
+    assert places == sorted(places)
+    for panel, start, end in zip(_PANELS, places, [*places[1:], len(out)], strict=True):
+        for command in _PANELS[panel]:
+            assert f"│ {command} " in out[start:end]
+
+
+def test_every_command_is_in_one_panel():
+    files = {
+        path.stem.removesuffix("_command").replace("_", "-")
+        for path in Path(mdfconv.cli.__file__).parent.glob("*_command.py")
+    }
+    named = [name for names in _PANELS.values() for name in names]
+    assert sorted(named) == sorted(
+        name.removesuffix("_command").replace("_", "-") for name in files
     )
-    assert script.stdout.decode().split() == ["beckmann"]
 
 
 def test_start_up_imports_only_what_the_command_needs():

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import mdfconv
+from mdfconv.conversion.endpoint import endpoint
 from tests.cli.runner import COMMAND, run, run_on_terminal
 
 
@@ -295,3 +296,35 @@ def test_arguments_and_standard_input_keep_their_order():
     assert got == pytest.approx(alone, rel=1e-9)
     status, out, _ = run("convert", "--from", "nothing", "--to", "ggx", "-", stdin="x")
     assert (status, out) == (2, "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [
+        (["--to", "roughness", "0.2"], "ggx:roughness"),
+        (["--to", "Glossiness", "0.2"], "ggx:glossiness"),
+        (["--to", "shininess", "0.2"], "blinn-phong"),
+        (["--to", "obj2gltf", "0.2"], "blinn-phong:obj2gltf"),
+        (["--to", "ggx", "20%"], "0.2"),
+        (["--to", "ggx", "1%,20%"], "0.01,0.2"),
+        (["--to", "gtr", "--gamma", "150%", "0.2"], "1.5"),
+        (["--to", "blinn-phong:obj2gltf", "--specular", "20%", "0.2"], "0.2"),
+    ],
+)
+def test_what_was_meant_is_said(arguments, meant):
+    status, out, err = run("convert", "--from", "beckmann", *arguments)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert f"id you mean {meant}?" in err
+
+
+def test_every_meaning_that_is_offered_is_a_name():
+    for mdf in mdfconv.list_distributions():
+        for meaning in mdf.meant_by.values():
+            assert endpoint(meaning).label == meaning
+
+
+@pytest.mark.parametrize("value", ["nan%", "inf%", "%", "a%"])
+def test_what_is_no_percentage_offers_nothing(value):
+    status, _, err = run("convert", "--from", "beckmann", "--to", "ggx", value)
+    assert status == 2
+    assert "did you mean" not in err

@@ -1,0 +1,152 @@
+"""What the shell completes: every name that an option takes.
+
+Each function goes to Typer's ``autocompletion``, which keeps what begins as the word does. What a
+name is looked up in is imported when the shell asks.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+
+_COLON = ":"
+# How a texture stores what is beyond 1, besides as programs do.
+_TEXELS_OF_EXPONENTS = ("exponent", "log2")
+
+
+def distributions() -> list[str]:
+    """Return the names of the distributions."""
+    from mdfconv.distributions import list_distributions
+
+    return [mdf.name for mdf in list_distributions()]
+
+
+def endpoints(incomplete: str) -> list[str]:
+    """Return the names of the distributions; once a colon is typed, those of the encodings."""
+    from mdfconv.conversion.endpoint import encodings_of
+    from mdfconv.distributions import list_distributions
+
+    known = {mdf.name: mdf for mdf in list_distributions()}
+    if incomplete in known and encodings_of(known[incomplete]):
+        return [*known, *_encoded(incomplete)]
+    return _encoded(incomplete.partition(_COLON)[0]) if _COLON in incomplete else [*known]
+
+
+def _encoded(name: str) -> list[str]:
+    from mdfconv.conversion.endpoint import encodings_of
+    from mdfconv.distributions import distribution
+    from mdfconv.errors import MdfconvError
+
+    try:
+        return [f"{name}{_COLON}{encoding}" for encoding in encodings_of(distribution(name))]
+    except MdfconvError:
+        return []
+
+
+def targets(incomplete: str) -> list[str]:
+    """Return what a conversion can go to: distributions and encodings, and all of them."""
+    from mdfconv.registry import ALL
+
+    return [*endpoints(incomplete), ALL]
+
+
+def texels(incomplete: str) -> list[str]:
+    """Return what the texels of a texture can be."""
+    from mdfconv.distributions import list_distributions
+
+    exponents = [mdf.name for mdf in list_distributions() if mdf.parameter.typical[1] > 1]
+    stored = [f"{name}{_COLON}{word}" for name in exponents for word in _TEXELS_OF_EXPONENTS]
+    return [*endpoints(incomplete), *stored]
+
+
+def methods() -> list[str]:
+    """Return the names of the conversion methods."""
+    from mdfconv.conversion import list_methods
+
+    return [method.name for method in list_methods()]
+
+
+def metrics() -> list[str]:
+    """Return the names of the metrics."""
+    from mdfconv.fitting.metrics import list_metrics
+
+    return list(list_metrics())
+
+
+def languages() -> list[str]:
+    """Return the languages of formulas."""
+    from mdfconv.formula import LANGUAGES
+
+    return LANGUAGES.names
+
+
+def furnace_brdfs() -> list[str]:
+    """Return the BRDFs that the furnace takes."""
+    from mdfconv.brdf.models import list_models
+
+    return list_models()
+
+
+def normalizers() -> list[str]:
+    """Return the normalizers of modified Phong."""
+    from mdfconv.brdf.phong import NORMALIZERS
+
+    return NORMALIZERS.names
+
+
+def maskings() -> list[str]:
+    """Return the masking functions."""
+    from mdfconv.brdf.masking import MASKINGS
+
+    return MASKINGS.names
+
+
+def materials() -> list[str]:
+    """Return the materials that are known by name."""
+    from mdfconv.brdf.materials import list_materials
+
+    return list_materials()
+
+
+@contextmanager
+def whole_words() -> Iterator[None]:
+    """Let names with a colon be completed in bash, which takes a colon for the end of a word.
+
+    Bash gives ``ggx:rou`` as the three words ``ggx``, ``:`` and ``rou``, and puts what it is
+    answered in the place of the last one only.
+    """
+    words = os.environ.get("COMP_WORDS", "")
+    if "bash" not in os.environ.get("_MDFCONV_COMPLETE", "") or _COLON not in words:
+        yield
+        return
+    parts = words.split("\n") if "\n" in words else words.split()
+    joined, number = _joined(parts, int(os.environ["COMP_CWORD"]))
+    os.environ["COMP_WORDS"], os.environ["COMP_CWORD"] = "\n".join(joined), str(number)
+    # Where bash was told otherwise the word is whole, and replaced as such.
+    divided = joined != parts and number < len(joined)
+    before = joined[number].rpartition(_COLON)[0] if divided else ""
+    answer = io.StringIO()
+    try:
+        with redirect_stdout(answer):
+            yield
+    finally:
+        start = f"{before}{_COLON}" if before else ""
+        lines = [line.removeprefix(start) for line in answer.getvalue().splitlines()]
+        sys.stdout.write("\n".join(lines))
+
+
+def _joined(parts: list[str], number: int) -> tuple[list[str], int]:
+    """Return the words that colons divide as one each, and the place of the current one."""
+    words: list[str] = []
+    place = number
+    for index, part in enumerate(parts):
+        if words and (part.startswith(_COLON) or words[-1].endswith(_COLON)):
+            words[-1] += part
+        else:
+            words.append(part)
+        if index == number:
+            place = len(words) - 1
+    return words, min(place, len(words))

@@ -108,7 +108,7 @@ def replace_chunks(path: Path, chunks: bytes) -> None:
     """
     content = path.read_bytes()
     texels, end = 0, 8
-    while len(content) >= end + 12 and not content[:end].endswith(_PNG_END):
+    while len(content) >= end + 12 and not content.endswith(_PNG_END, 0, end):
         if content[end + 4 : end + 8] == b"IDAT":
             texels = texels or end
         end += 12 + int.from_bytes(content[end : end + 4])

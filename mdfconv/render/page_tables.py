@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,23 +15,22 @@ from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.dialects import Specular, dialects_of
 from mdfconv.distributions.evaluation import Array
-from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.light.lobe_spectrum import LobeSpectrum
 
 # The metric with which the page begins: light from all around is the usual case.
 FIRST_METRIC = "environment"
-# Of the interpolation of a converted parameter, relative: with four digits shown, within 0.1 %.
+# Of a converted parameter, relative: with four digits shown the number is within 0.1 %.
 LARGEST_ERROR = 2e-4
-_FEWEST_NODES, _MOST_NODES = 65, 2049
+# Of stored numbers: relative, and absolute beside that.
+_RELATIVE, _ABSOLUTE = 3e-4, 5e-6
+# Nodes to begin with, and the step of ln p that is narrow enough for a jump.
+_NODES, _NARROW = 65, 1e-6
 # Of lobes: parameters, and angles in u = t/(1 + t), t = tan β / α with D(0) = 1/(π α²).
 _PARAMETERS, _ANGLES = 48, 96
 # What is less than e to this of D(0) is not told from 0.
 _LEAST_LOG = -24.0
 _ERROR_NODES = 33
-# Of stored numbers: the nodes to begin with, the error allowed, relative and beside that absolute,
-# and how often a step is halved at most, as beside what cannot be stored.
-_ENCODING_NODES, _RELATIVE, _ABSOLUTE, _HALVINGS = 65, 2e-4, 5e-6, 8
 # On both sides of a clamp, relative: a rule may have a step there.
 _BESIDE = 1e-9
 # The highest degree of the environment.
@@ -56,6 +56,42 @@ def grid(low: float, high: float, count: int) -> Array:
     return np.exp(np.linspace(np.log(low), np.log(high), count))
 
 
+def refined(
+    function: Callable[[Array], Array], nodes: Array, relative: float, absolute: float
+) -> tuple[Array, Array, float]:
+    """Return nodes between which a function is as good as linear, but for narrow jumps.
+
+    Parameters
+    ----------
+    function : callable
+        From ln p, shape (n,), to values of shape (k, n); NaN where there is none.
+    nodes : numpy.ndarray, shape (m,)
+        Those to begin with: steps are halved where one of the k is not linear.
+    relative, absolute : float
+        The error that is allowed in the middle of a step, whose sum counts.
+
+    Returns
+    -------
+    nodes, values : numpy.ndarray, shapes (n,) and (k, n)
+        The nodes and the values there.
+    error : float
+        The largest error in the middle of a step that is no jump.
+    """
+    values = function(nodes)
+    while True:
+        middle = 0.5 * (nodes[:-1] + nodes[1:])
+        between = function(middle)
+        error = np.abs(0.5 * (values[:, :-1] + values[:, 1:]) - between)
+        none = np.isnan(values[:, :-1]) & np.isnan(values[:, 1:])
+        linear = none | (error <= relative * np.abs(between) + absolute)
+        bad = ~linear.all(axis=0) & (np.diff(nodes) > _NARROW)
+        if not bad.any():
+            return nodes, values, float(np.max(error, where=linear & ~none, initial=0))
+        order = np.argsort(np.concatenate([nodes, middle[bad]]))
+        nodes = np.concatenate([nodes, middle[bad]])[order]
+        values = np.concatenate([values, between[:, bad]], axis=1)[:, order]
+
+
 def conversions(
     source: Distribution, target: Distribution
 ) -> tuple[list[dict[str, Any]], tuple[float, float], float]:
@@ -64,9 +100,9 @@ def conversions(
     Returns
     -------
     tables : list of dict
-        For each metric ``name`` and ``keeps``, ``parameter``, 32-bit numbers, as ln p of the
-        target at parameters of the source in equal steps of the logarithm, and the ``rmse`` and
-        ``maximum`` error that remain, at fewer.
+        For each metric ``name`` and ``keeps``; ln p of the target, ``parameter``, at ln p of the
+        source, ``nodes``; and the ``rmse`` and ``maximum`` error that remain, at parameters of
+        the source in equal steps of ln p.
     span : tuple of two float
         The range of the target's parameters.
     error : float
@@ -83,29 +119,26 @@ def _conversion(
     source: Distribution, target: Distribution, metric: Metric
 ) -> tuple[dict[str, Any], Array, float]:
     ends = Endpoint(source), Endpoint(target)
-    count, error = _FEWEST_NODES, np.inf
-    while error > LARGEST_ERROR:
-        if count > _MOST_NODES:
-            raise MdfconvError(
-                f"the conversion from {source.label} to {target.label} under the {metric.name} "
-                "metric is too rough for a table"
-            )
-        fine = grid(*source.parameter.typical, 2 * count - 1)
-        logs = np.log(convert(fine, *ends, metric=metric))
-        between = 0.5 * (logs[:-2:2] + logs[2::2])
-        error = float(np.max(np.abs(np.expm1(between - logs[1::2]))))
-        nodes, count = logs[::2], 2 * count - 1
-    few = grid(*source.parameter.typical, _ERROR_NODES)
-    results = np.asarray(convert(few, *ends, metric=metric))
-    rmse, maximum = remaining_error(source, few, target, results, metric)
+    low, high = source.parameter.typical
+
+    def converted(logs: Array) -> Array:
+        # The ends of the range, whose logarithm is rounded, are inside of it.
+        parameter = np.clip(np.exp(logs), low, high)
+        return np.log(convert(parameter, *ends, metric=metric))[None, :]
+
+    start = np.log(grid(low, high, _NODES))
+    nodes, (logs,), error = refined(converted, start, 0, LARGEST_ERROR)
+    few = grid(low, high, _ERROR_NODES)
+    rmse, maximum = remaining_error(source, few, target, convert(few, *ends, metric=metric), metric)
     table = {
         "name": str(metric),
         "keeps": metric.keeps,
-        "parameter": packed(nodes, np.float32),
+        "nodes": packed(nodes, np.float64),
+        "parameter": packed(logs, np.float32),
         "rmse": rounded(rmse, 4),
         "maximum": rounded(maximum, 4),
     }
-    return table, nodes, error
+    return table, logs, error
 
 
 def lobes(mdf: Distribution, low: float, high: float) -> dict[str, Any]:
@@ -154,9 +187,20 @@ def encodings(mdf: Distribution, low: float, high: float) -> dict[str, Any]:
     """
     plain = Endpoint(mdf)
     ends = [plain, *(endpoint(name) for name in _encoded_names(mdf))]
-    nodes = _encoding_nodes([end for end in ends if end.encoding], low, high)
+    encoded = [end for end in ends if end.encoding]
+    limits = [clamp.limit for end in ends if end.encoding for clamp in end.encoding.clamps]
+    beside = [limit * (1 + side) for limit in limits for side in (-_BESIDE, 0, _BESIDE)]
+    inside = [value for value in beside if low < value < high]
+    nodes = np.log(np.unique(np.concatenate([grid(low, high, _NODES), inside])))
+    if encoded:
+        nodes, _, _ = refined(
+            lambda logs: np.array([end.encode(np.exp(logs)) for end in encoded]),
+            nodes,
+            _RELATIVE,
+            _ABSOLUTE,
+        )
     return {
-        "nodes": packed(np.log(nodes), np.float64),
+        "nodes": packed(nodes, np.float64),
         "forms": [
             {
                 "name": end.label,
@@ -164,35 +208,11 @@ def encodings(mdf: Distribution, low: float, high: float) -> dict[str, Any]:
                 "formula": end.encoding.formula if end.encoding else "",
                 "clamped": "; ".join(end.clamped(np.empty(0))),
                 # The parameter itself is at hand.
-                "values": packed(end.encode(nodes), np.float32) if end.encoding else "",
+                "values": packed(end.encode(np.exp(nodes)), np.float32) if end.encoding else "",
             }
             for end in ends
         ],
     }
-
-
-def _encoding_nodes(ends: list[Endpoint], low: float, high: float) -> Array:
-    """Return the parameters between which every stored number is as good as linear in ln p."""
-    limits = [clamp.limit for end in ends if end.encoding for clamp in end.encoding.clamps]
-    beside = [limit * (1 + side) for limit in limits for side in (-_BESIDE, 0, _BESIDE)]
-    inside = [value for value in beside if low < value < high]
-    nodes = np.unique(np.concatenate([grid(low, high, _ENCODING_NODES), inside]))
-    for _ in range(_HALVINGS):
-        middle = np.sqrt(nodes[:-1] * nodes[1:])
-        bad = np.zeros(middle.size, dtype=bool)
-        for end in ends:
-            values, between = end.encode(nodes), end.encode(middle)
-            error = np.abs(0.5 * (values[:-1] + values[1:]) - between)
-            # What cannot be stored is NaN, at both ends of a step or at one.
-            fits = error <= _RELATIVE * np.abs(between) + _ABSOLUTE
-            whole = np.isnan(values[:-1]) & np.isnan(values[1:])
-            bad |= ~(fits | whole)
-        # Steps as narrow as those beside a clamp are narrow enough.
-        bad &= nodes[1:] > nodes[:-1] * (1 + 4 * _BESIDE)
-        if not bad.any():
-            break
-        nodes = np.sort(np.concatenate([nodes, middle[bad]]))
-    return nodes
 
 
 def _encoded_names(mdf: Distribution) -> list[str]:

@@ -103,7 +103,12 @@ def command(
     ] = None,
     source: Annotated[
         str,
-        typer.Option("--from", metavar="MDF", help="What the page converts from."),
+        typer.Option(
+            "--from",
+            metavar="MDF",
+            autocompletion=completion.endpoints,
+            help="What the page converts from.",
+        ),
     ] = _REFERENCE,
     dpi: DpiOption = 120,
     output: FolderOption = None,

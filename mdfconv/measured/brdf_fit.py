@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from mdfconv.brdf.directions import polar_angle
 from mdfconv.brdf.fresnel import dielectric, schlick_fresnel
 from mdfconv.brdf.masking import v_cavity
 from mdfconv.distributions import Distribution, distribution
@@ -203,7 +204,7 @@ class _Geometry:
         if not keep.any():
             raise MdfconvError("no sample is positive: a logarithmic loss has nothing to fit")
         half = replace(data, incident=incident, outgoing=outgoing).half
-        self.beta = np.arctan2(np.hypot(half[:, 0], half[:, 1]), half[:, 2])
+        self.beta = polar_angle(half)
         self.difference = np.clip(np.einsum("ij,ij->i", incident, half), 0, 1)
         self.cosines = np.stack([incident[:, 2], outgoing[:, 2]])
         self.tangents = np.stack(

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from mdfconv.brdf.directions import polar_angle
 from mdfconv.measured.analysis import Analysis
 from mdfconv.measured.brdf_fit import BrdfFit
 from mdfconv.measured.directional import DirectionalSamples
@@ -98,7 +99,7 @@ def _facts(analysis: Analysis) -> Iterator[str]:
             yield f"angles of incidence {', '.join(f'{angle:.3g}°' for angle in angles)}"
         else:
             yield f"{angles.size} angles of incidence, {angles[0]:.3g}° to {angles[-1]:.3g}°"
-        reflected = np.degrees(np.arccos(np.clip(samples.outgoing[:, 2], -1, 1)))
+        reflected = np.degrees(polar_angle(samples.outgoing))
         yield f"angles of reflection up to {reflected.max():.3g}°"
     else:
         low, high = np.degrees(samples.beta[[0, -1]])

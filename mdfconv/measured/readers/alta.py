@@ -12,10 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
+from mdfconv.brdf.directions import azimuth, direction, polar_angle
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.directional import DirectionalSamples, directional_samples
-from mdfconv.measured.readers.angles import from_half_and_difference, spherical, zenith_and_azimuth
+from mdfconv.measured.readers.angles import from_half_and_difference
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, decode_head
 from mdfconv.measured.readers.tables import parse_table
 from mdfconv.measured.samples import Samples, samples
@@ -31,8 +32,8 @@ _PLAIN = ("INV_STERADIAN", "RGB_COLOR")
 
 def _projected(x: Array) -> tuple[Array, Array]:
     zero = np.zeros(len(x))
-    view = spherical(np.hypot(x[:, 1], x[:, 2]), np.arctan2(x[:, 2], x[:, 1]))
-    return spherical(x[:, 0], zero), view
+    view = direction(np.hypot(x[:, 1], x[:, 2]), np.arctan2(x[:, 2], x[:, 1]))
+    return direction(x[:, 0], zero), view
 
 
 def _half_and_difference(x: Array) -> tuple[Array, Array]:
@@ -45,11 +46,11 @@ _TWO_DIRECTIONS: dict[str, tuple[int, Callable[[Array], tuple[Array, Array]]]] =
     "ISOTROPIC_TL_TV_PROJ_DPHI": (3, _projected),
     "ISOTROPIC_TV_TL_DPHI": (
         3,
-        lambda x: (spherical(x[:, 1], x[:, 2]), spherical(x[:, 0], np.zeros(len(x)))),
+        lambda x: (direction(x[:, 1], x[:, 2]), direction(x[:, 0], np.zeros(len(x)))),
     ),
     "SPHERICAL_TL_PL_TV_PV": (
         4,
-        lambda x: (spherical(x[:, 0], x[:, 1]), spherical(x[:, 2], x[:, 3])),
+        lambda x: (direction(x[:, 0], x[:, 1]), direction(x[:, 2], x[:, 3])),
     ),
     "RUSIN_TH_TD_PD": (3, lambda x: _half_and_difference(np.insert(x, 1, 0, axis=1))),
     "RUSIN_TH_PH_TD_PD": (4, _half_and_difference),
@@ -85,7 +86,7 @@ def _read(source: Source, options: ReadOptions) -> Samples | DirectionalSamples:
         if kind == _WEIGHTED:
             values = values / np.where(view[:, 2:] > 0, view[:, 2:], np.nan)
             notes += ("the values hold the cosine of the view, by which they are divided",)
-        angles = (*zenith_and_azimuth(light), *zenith_and_azimuth(view))
+        angles = (polar_angle(light), azimuth(light), polar_angle(view), azimuth(view))
     return directional_samples(path, *angles, values, names, notes)
 
 

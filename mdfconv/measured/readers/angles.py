@@ -4,20 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from mdfconv.brdf.directions import direction, mirrored
 from mdfconv.distributions.evaluation import Array
-
-
-def spherical(theta: Array, phi: Array) -> Array:
-    """Return unit vectors, shape (n, 3), of zenith and azimuth in radians."""
-    sine = np.sin(theta)
-    return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)
-
-
-def zenith_and_azimuth(vectors: Array) -> tuple[Array, Array]:
-    """Return the zenith, [0, π], and the azimuth of vectors, shape (n, 3), in radians."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    # An arccosine of z would lose half of the digits near the normal.
-    return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 
 def turn_from_normal(vectors: Array, theta: Array, phi: Array) -> Array:
@@ -47,8 +35,8 @@ def from_half_and_difference(
     tuple of numpy.ndarray
         The first direction, and the one on the other side of the half vector.
     """
-    first = spherical(theta_difference, phi_difference)
-    second = first * (-1.0, -1.0, 1.0)
+    first = direction(theta_difference, phi_difference)
+    second = mirrored(first)
     return (
         turn_from_normal(first, theta_half, phi_half),
         turn_from_normal(second, theta_half, phi_half),

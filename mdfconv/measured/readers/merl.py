@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from mdfconv.brdf.directions import azimuth as azimuths
+from mdfconv.brdf.directions import polar_angle
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.directional import DirectionalSamples, directional_samples
-from mdfconv.measured.readers.angles import from_half_and_difference, zenith_and_azimuth
+from mdfconv.measured.readers.angles import from_half_and_difference
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, open_source
 from mdfconv.measured.samples import Samples, samples
 
@@ -93,8 +95,10 @@ def read_merl_directional(
     note = f"{len(taken)} of {planes[0].size} cells are taken, by chance and as many of every θ_h"
     return directional_samples(
         source.path,
-        *zenith_and_azimuth(incident),
-        *zenith_and_azimuth(outgoing),
+        polar_angle(incident),
+        azimuths(incident),
+        polar_angle(outgoing),
+        azimuths(outgoing),
         taken,
         _CHANNELS,
         (note,),

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mdfconv.brdf.directions import polar_angle
 from mdfconv.distributions.evaluation import Array
 from mdfconv.measured.directional import DirectionalSamples
 
@@ -59,8 +60,7 @@ def _fall(samples: DirectionalSamples) -> float:
     It is the mean angle with the values as weights, less the one without, in standard
     deviations.
     """
-    half = samples.half
-    beta = np.arctan2(np.hypot(half[:, 0], half[:, 1]), half[:, 2])
+    beta = polar_angle(samples.half)
     weight = _brightness(samples.values)
     spread = float(np.std(beta))
     if spread < 1e-9 or not weight.any():

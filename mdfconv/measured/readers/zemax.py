@@ -14,10 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from mdfconv.brdf.directions import azimuth as azimuths
+from mdfconv.brdf.directions import direction, polar_angle
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.directional import DirectionalSamples, directional_samples
-from mdfconv.measured.readers.angles import spherical, turn_from_normal, zenith_and_azimuth
+from mdfconv.measured.readers.angles import turn_from_normal
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, decode_head
 from mdfconv.measured.readers.words import Words
 
@@ -112,9 +114,9 @@ def _samples(path: Path, grid: _Grid, values: Array, channels: Sequence[str]) ->
         )
     )
     # About the specular direction at azimuth 0, where x points away from the normal.
-    about = spherical(radial, np.pi + azimuth)
+    about = direction(radial, np.pi + azimuth)
     outgoing = turn_from_normal(about, incidence, rotation)
-    theta, phi = zenith_and_azimuth(outgoing)
+    theta, phi = polar_angle(outgoing), azimuths(outgoing)
     return directional_samples(
         path,
         incidence,

@@ -17,7 +17,7 @@ from mdfconv.fitting.fit import fit
 from mdfconv.fitting.metrics.unit import Unit
 from mdfconv.fitting.quadrature import UniformSamples
 from mdfconv.measured.lobe_fit import fit_lobe
-from mdfconv.measured.merl import read_merl
+from mdfconv.measured.readers.merl import read_merl
 from mdfconv.paper.table2 import FITTED, SAMPLES, paper_sweep
 
 REPEATS = 15

@@ -11,6 +11,7 @@ import numpy as np
 from PIL import Image
 
 from mdfconv.scene import TextureRule, convert_texture, convert_texture_file
+from tests.scene.pictures import write_tiff
 
 SIZE = 4096
 RULE = TextureRule("blinn-phong:exponent", "ggx:roughness", metric="energy")
@@ -56,8 +57,9 @@ def main():
         print(f"decode {decoding:.2f} s, encode {encoding:.2f} s, file {whole:.2f} s")
         print(f"convert {converting:.3f} s: {100 * converting / (decoding + encoding):.1f} %")
         print(f"dithered to 8 bits {dithering:.2f} s")
-        deep = folder / "deep.tif"
-        convert_rgb(deep, given)
+        deep = write_tiff(
+            folder / "deep.tif", np.repeat(given[..., None], 3, axis=2), deflate=True, rows=64
+        )
         for file, depth, channel, size in (
             (source, 16, "l", raw),
             (source, 8, "l", raw),
@@ -70,15 +72,6 @@ def main():
                 f"{file.name} to {depth} bits: raw {size / 1e6:.0f} MB, peak {most / 1e6:.0f} MB, "
                 f"{most / size:.2f} × raw, above the imports {(most - base) / size:.2f} × raw"
             )
-
-
-def convert_rgb(path, grey):
-    """Write three channels of 16 bits."""
-    import pyvips
-
-    samples = np.repeat(grey[..., None], 3, axis=2)
-    image = pyvips.Image.new_from_memory(samples, SIZE, SIZE, 3, "ushort")
-    image.copy(interpretation="rgb16").tiffsave(str(path), compression="deflate")
 
 
 if __name__ == "__main__":

@@ -1,11 +1,14 @@
 """The README tells the truth: its examples are run, its commands exist."""
 
 import doctest
+import json
 import re
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 import mdfconv
 from tests.cli.runner import run
@@ -57,6 +60,47 @@ def test_docstring_examples(module):
     found = doctest.testmod(__import__(module, fromlist=["_"]))
     assert found.failed == 0
     assert found.attempted
+
+
+RECIPES = re.findall(r"^\| .* \| `(mdfconv .*)` \|$", README, re.M)
+
+
+def files_of_recipes(folder):
+    """Write what the recipes start from."""
+    (folder / "chair.mtl").write_text("newmtl wood\nNs 100\n")
+    robot = {
+        "asset": {"version": "2.0", "generator": "obj2gltf"},
+        "materials": [{"pbrMetallicRoughness": {"roughnessFactor": 0.9}}],
+    }
+    (folder / "robot.gltf").write_text(json.dumps(robot))
+    texels = np.linspace(20, 250, 64).astype(np.uint8).reshape(8, 8)
+    for name in ("gloss.png", "glossiness.png"):
+        Image.fromarray(texels).save(folder / name)
+    (folder / "kitchen.xml").write_text(
+        '<scene version="3.0.0"><bsdf type="roughconductor">'
+        '<float name="alpha" value="0.2"/></bsdf></scene>\n'
+    )
+    beta = np.linspace(0, 80, 60)
+    values = mdfconv.distribution("ggx").unit(np.radians(beta), 0.2)
+    rows = "\n".join(f"{angle},{value}" for angle, value in zip(beta, values, strict=True))
+    (folder / "paint.csv").write_text(f"angle_degrees,value\n{rows}\n")
+
+
+@pytest.mark.parametrize("line", RECIPES)
+def test_recipe(line, tmp_path):
+    files_of_recipes(tmp_path)
+    words = shlex.split(line)[1:]
+    status, out, err = run(*words, cwd=tmp_path)
+    assert status == 0, err
+    for option in ("-o", "--report"):
+        if option in words:
+            assert (tmp_path / words[words.index(option) + 1]).stat().st_size
+    assert out or "wrote" in err
+
+
+def test_there_are_recipes():
+    commands = {line.split()[1] for line in RECIPES}
+    assert {"mtl", "gltf", "texture", "mitsuba", "convert", "formula", "fit"} <= commands
 
 
 def test_every_command_and_distribution_is_documented():

@@ -24,7 +24,7 @@ from mdfconv.registry import unknown_name
 
 # As the help shows them: what is asked every day first.
 _PANELS = {
-    "Commands": ("convert", "mtl", "gltf", "texture", "formula", "fit", "list"),
+    "Commands": ("convert", "mtl", "gltf", "mitsuba", "texture", "formula", "fit", "list"),
     "Studies": (
         "fit-table", "plot-error", "compare", "light", "furnace", "fresnel", "report",
     ),

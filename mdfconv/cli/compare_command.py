@@ -17,9 +17,10 @@ from mdfconv.cli.options import (
     MethodOption,
     chosen_metric,
 )
-from mdfconv.cli.outputs import check_folder, write_named
+from mdfconv.cli.outputs import check_folder, check_outputs, write_named
 from mdfconv.cli.tables import write_table
 from mdfconv.distributions import one_parameter_distribution
+from mdfconv.errors import MdfconvError
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text
 
@@ -30,6 +31,10 @@ _COLUMNS = (
     "figure", "conversion", "distribution", "parameter", "rmse_linear", "psnr_linear",
     "rmse_displayed", "psnr_displayed", "peak_ratio", "energy_ratio",
 )  # fmt: skip
+
+
+# As `mdfconv.render.comparison` has it, which takes long to import.
+_REFERENCE = "beckmann"
 
 
 class Light(StrEnum):
@@ -88,6 +93,23 @@ def command(
     ] = None,
     normalized: Annotated[bool, typer.Option("--normalized/--unit", help="The form of D.")] = True,
     size: Annotated[int, typer.Option(metavar="N", help="Pixels a side of a picture.")] = 256,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write a page with sliders instead, for the first --mdf, which may be a stored "
+            "form; ggx if not given. Pictures, too, only with --output.",
+        ),
+    ] = None,
+    source: Annotated[
+        str,
+        typer.Option(
+            "--from",
+            metavar="MDF",
+            autocompletion=completion.endpoints,
+            help="What the page converts from.",
+        ),
+    ] = _REFERENCE,
     dpi: DpiOption = 120,
     output: FolderOption = None,
     format_: FormatOption = None,
@@ -105,6 +127,9 @@ def command(
     approximate one (smoothie-approx, half angle by the length of h in the surface, no G), or
     around the mirror direction (modified-phong, which is Phong's for blinn-phong).
 
+    With --html one file for a browser, which needs no other: both on one sphere, their lobes, and
+    the converted number, while the parameter, the metric, the light and the stored form change.
+
     Examples:
 
     mdfconv compare
@@ -114,11 +139,19 @@ def command(
     mdfconv compare --m-b 0.1 --method fit --metric display --brdf cook-torrance --size 512
 
     mdfconv compare --m-b 0.3 --material gold --brdf smoothie
+
+    mdfconv compare --from blinn-phong --mdf ggx:roughness --html page.html
     """
+    if html is not None:
+        _write_page(html, source, (mdf or ["ggx"])[0], m_b)
+        if output is None:
+            return
     from mdfconv.paper.error_curves import DRAWN
     from mdfconv.render.comparison import PAPER_FIGURES, Scene, compare
     from mdfconv.render.comparison_figure import draw_comparison
 
+    if html is None and source != _REFERENCE:
+        raise MdfconvError(f"pictures are compared with {_REFERENCE}", "--from goes with --html")
     rules = _rules(method, metric, exposure)
     names = list(dict.fromkeys(one_parameter_distribution(name).name for name in mdf or DRAWN))
     scene = Scene(brdf.value, light.value, normalized, exposure, size, material)
@@ -134,6 +167,17 @@ def command(
         contents[folder / f"{name}.png"] = draw_comparison(comparison, dpi)
     write_named(contents)
     write_table(_COLUMNS, rows, format_, title="Pictures against Beckmann's")
+
+
+def _write_page(path: Path, source: str, target: str, m_b: list[float] | None) -> None:
+    from mdfconv.conversion.endpoint import endpoint
+    from mdfconv.render.page import comparison_page
+
+    check_outputs(path)
+    ends = endpoint(source), endpoint(target)
+    if m_b and ends[0].distribution.name != _REFERENCE:
+        raise MdfconvError(f"--m-b is the parameter of {_REFERENCE}, not of {ends[0].label}")
+    write_named({path: comparison_page(*ends, m_b[0] if m_b else None)})
 
 
 def _rules(method: str | None, metric: str | None, exposure: float) -> list[Rule]:

@@ -29,8 +29,8 @@ from mdfconv.output.files import file_bytes, write_files
 
 if TYPE_CHECKING:
     from mdfconv.distributions import Distribution
-    from mdfconv.measured.analysis import Analysis, FitOptions, Measurements
-    from mdfconv.measured.text import Columns
+    from mdfconv.measured.analysis import Analysis, FitOptions
+    from mdfconv.measured.readers import ReadOptions
 
 # Of what a table on a terminal shows of fits to two directions.
 _SHOWN_OF_BRDFS = (
@@ -54,6 +54,19 @@ class Loss(StrEnum):
     cosine = "cosine"
 
 
+class AngleIs(StrEnum):
+    """What one angle is the angle of."""
+
+    half = "half"
+    reflected = "reflected"
+    incident = "incident"
+
+
+def _column_option(name: str, what: str) -> Any:
+    help_ = f"Column of the {what}, by name or number from 1."
+    return typer.Option(name, metavar="COLUMN", help=help_)
+
+
 class Masking(StrEnum):
     """The masking of a BRDF."""
 
@@ -63,7 +76,13 @@ class Masking(StrEnum):
 
 
 def command(
-    data: Annotated[list[Path], typer.Argument(metavar="DATA...", help="Files of samples.")],
+    data: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="DATA...",
+            help="Files of samples, or patterns such as '*.csv'; - is standard input.",
+        ),
+    ],
     targets: Annotated[
         list[str] | None,
         typer.Option("--to", metavar="MDF", help="Distribution to fit; repeatable; default all."),
@@ -73,8 +92,23 @@ def command(
         typer.Option(help="ndf (default for text), or brdf at θ_d ≈ 0 (default for MERL, ALTA)."),
     ] = None,
     angle: Annotated[
-        str, typer.Option(metavar="COLUMN", help="Column of angles, by name or number from 1.")
-    ] = "1",
+        str | None,
+        typer.Option(
+            metavar="COLUMN",
+            help="Column of angles, by name or number from 1; by default from the names.",
+        ),
+    ] = None,
+    angle_is: Annotated[
+        AngleIs | None,
+        typer.Option(
+            help="Of one angle: that of the half vector (default), or the zenith of the reflected "
+            "or incident direction, the other along the normal."
+        ),
+    ] = None,
+    theta_i: Annotated[str | None, _column_option("--theta-i", "incident zenith")] = None,
+    phi_i: Annotated[str | None, _column_option("--phi-i", "incident azimuth")] = None,
+    theta_o: Annotated[str | None, _column_option("--theta-o", "outgoing zenith")] = None,
+    phi_o: Annotated[str | None, _column_option("--phi-o", "outgoing azimuth")] = None,
     angle_unit: Annotated[
         str | None,
         typer.Option(
@@ -84,6 +118,12 @@ def command(
     values: Annotated[
         list[str] | None,
         typer.Option("--values", metavar="COLUMN", help="Column of values; repeatable."),
+    ] = None,
+    cells: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Of a MERL file: N cells of the whole, not the slice θ_d ≈ 0."
+        ),
     ] = None,
     max_angle: Annotated[
         float | None,
@@ -155,16 +195,23 @@ def command(
 
     mdfconv fit '*.csv' --format csv -o fits.csv
     """
-    outputs = check_outputs(png, output, report, inputs=data)
-    if len(data) > 1 and (png or report):
+    from mdfconv.measured.readers import ReadOptions
+    from mdfconv.output.files import find_files
+
+    files = find_files(data)
+    outputs = check_outputs(png, output, report, inputs=files)
+    if len(files) > 1 and (png or report):
         raise MdfconvError("--png and --report are of one file")
     options = _options(
         targets, gamma, _model(loss, masking, fresnel, robust=robust), quantity, max_angle,
         tolerance, separate=separate,
     )  # fmt: skip
-    columns = _columns(angle, angle_unit, values)
+    columns = ReadOptions(
+        angle, theta_i, phi_i, theta_o, phi_o, tuple(values or ()), angle_unit,
+        angle_is.value if angle_is else None, cells,
+    )  # fmt: skip
     only_two = bool(masking or fresnel or robust or loss is Loss.cosine)
-    analyses = _analyses(data, columns, options, only_two=only_two)
+    analyses = _analyses(files, columns, options, only_two=only_two)
     form = form_of(format_, output)
     names, rows = _table(analyses, form, separate)
     contents = {output: file_bytes(table_text(names, rows, form))} if output else {}
@@ -176,7 +223,7 @@ def command(
     if report:
         contents |= _report(analyses[0], report, separate=separate, logarithms=logarithms)
     if len(contents) > len(outputs):
-        check_outputs(*(path for path in contents if path not in outputs), inputs=data)
+        check_outputs(*(path for path in contents if path not in outputs), inputs=files)
     write_files(contents)
     if not output:
         title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
@@ -217,14 +264,8 @@ def _options(
     )
 
 
-def _columns(angle: str, unit: str | None, values: list[str] | None) -> Columns:
-    from mdfconv.measured.text import Columns
-
-    return Columns(angle, unit, tuple(values or ()))
-
-
 def _analyses(
-    files: Sequence[Path], columns: Columns, options: FitOptions, *, only_two: bool
+    files: Sequence[Path], columns: ReadOptions, options: FitOptions, *, only_two: bool
 ) -> list[Analysis]:
     """Return the fits to each file; to several in processes."""
     work = partial(_analyse, columns=columns, options=options, only_two=only_two)
@@ -241,30 +282,18 @@ def _analyses(
     return analyses
 
 
-def _analyse(path: Path, columns: Columns, options: FitOptions, *, only_two: bool) -> Analysis:
+def _analyse(path: Path, columns: ReadOptions, options: FitOptions, *, only_two: bool) -> Analysis:
     from mdfconv.measured.analysis import analyse
     from mdfconv.measured.directional import DirectionalSamples
+    from mdfconv.measured.readers import read
 
-    samples = _read(path, columns)
+    samples = read(path, columns)
     if only_two and not isinstance(samples, DirectionalSamples):
         raise MdfconvError(
             f"{path}: --masking, --fresnel, --robust and --loss cosine need two directions",
             "this file has one angle",
         )
     return analyse(path.name, samples, options)
-
-
-def _read(path: Path, columns: Columns) -> Measurements:
-    from mdfconv.measured.merl import read_merl
-    from mdfconv.measured.text import read_text
-
-    try:
-        if path.suffix.lower() == ".binary":
-            columns.refuse(path, "a MERL file has no columns")
-            return read_merl(path)
-        return read_text(path, columns)
-    except OSError as error:
-        raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
 
 
 def _table(
@@ -293,9 +322,16 @@ def _report(
     from mdfconv.reports.fit_report import report_files
 
     _, rows = _table([analysis], Format.table, separate)
-    texts = [{name: str(value) for name, value in row.items()} for row in rows]
+    texts = [{name: _cell(value) for name, value in row.items()} for row in rows]
     line = join(["mdfconv", *sys.argv[1:]])
     return report_files(report_of(analysis, texts, line, logarithms=logarithms), path)
+
+
+def _cell(value: Any) -> str:
+    """Return a cell of the report's table."""
+    if isinstance(value, bool):
+        return "yes" if value else ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _tell(analysis: Analysis, tolerance: float, *, named: bool) -> None:

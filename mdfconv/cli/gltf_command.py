@@ -167,7 +167,7 @@ def _convert(
 def _with_option(problem: str) -> str:
     """Return what is wrong with a material, with the option that helps."""
     from mdfconv.scene.gltf import HAS_TEXTURE
-    from mdfconv.scene.image_picture import ACCEPT_LOSSES
+    from mdfconv.scene.images import ACCEPT_LOSSES
 
     if problem == HAS_TEXTURE:
         return f"{problem}: --textures converts it"
@@ -177,8 +177,9 @@ def _with_option(problem: str) -> str:
 def _propose(files: list[str]) -> None:
     """Print which source each file's generator lets expect."""
     from mdfconv.distributions.dialects import Specular
+    from mdfconv.output.files import find_files
     from mdfconv.scene.gltf import dialects_by_generator, generator_of
-    from mdfconv.scene.material_files import find_files, read_file
+    from mdfconv.scene.material_files import read_file
 
     lines = []
     for path in find_files(files):

@@ -81,12 +81,8 @@ def convert_files(
     MdfconvError
         If a file cannot be read, converted at all, or written; nothing is then changed.
     """
-    from mdfconv.scene.material_files import (
-        choose_outputs,
-        find_files,
-        read_file,
-        write_conversions,
-    )
+    from mdfconv.output.files import find_files
+    from mdfconv.scene.material_files import choose_outputs, read_file, write_conversions
 
     converted = []
     for destination in choose_outputs(find_files(patterns), output, in_place=in_place):

@@ -33,7 +33,7 @@ class Depth(StrEnum):
 
 def command(
     source_file: Annotated[
-        Path, typer.Argument(metavar="IN", help="Texture: PNG, TIFF or OpenEXR.")
+        Path, typer.Argument(metavar="IN", help="Texture: PNG, TIFF, TGA or OpenEXR.")
     ],
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="OUT", help="File to write; not IN.")
@@ -61,7 +61,8 @@ def command(
         str | None,
         typer.Option(
             metavar="C",
-            help="r, g, b, a or l (grey), in OpenEXR its name; needed if there are several.",
+            help="r, g, b, a or l (grey), in OpenEXR its name; several as rgb or r,g. Needed if "
+            "there are several.",
         ),
     ] = None,
     method: MethodOption = None,
@@ -84,16 +85,16 @@ def command(
     ] = False,
     max_pixels: Annotated[
         int | None,
-        typer.Option(metavar="N", min=1, help="Largest picture to decode; default Pillow's limit."),
+        typer.Option(metavar="N", min=1, help="Largest picture to decode; default 134217728."),
     ] = None,
     png: PngOption = None,
 ) -> None:
     """Convert a roughness texture, texel by texel.
 
     Keeps the light of a natural environment, unless --metric or --method says otherwise. Other
-    channels, ICC profile and resolution are kept. Says on standard error how many texels
-    had no answer and took the nearest: a black texel of an exponent is the roughest surface, one
-    of an alpha or a roughness a perfect mirror.
+    channels, ICC profile, resolution and orientation are kept. Says on standard error how many
+    texels had no answer and took the nearest: a black texel of an exponent is the roughest
+    surface, one of an alpha or a roughness a perfect mirror.
 
     Examples:
 

@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.evaluation import (
-    PARTS_A_THREAD,
-    WORTH_THREADS,
-    Array,
-    check_threads,
-)
+from mdfconv.distributions.evaluation import Array, in_parts, worth_threads
 from mdfconv.errors import MdfconvError
 
 
@@ -34,19 +28,16 @@ def in_threads(function: Callable[[Any], Array], values: Any, threads: int) -> A
     MdfconvError
         If the number of threads makes no sense, or as the function does for all of the values.
     """
-    check_threads(threads)
     size = np.size(values)
-    if threads == 1 or size < WORTH_THREADS:
+    if not worth_threads(size, threads):
         return function(values)
     flat, result = values.reshape(-1), np.empty(size)
-    ends = np.linspace(0, size, threads * PARTS_A_THREAD + 1).astype(int).tolist()
 
     def compute(low: int, high: int) -> None:
         result[low:high] = function(flat[low:high])
 
     try:
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(compute, ends[:-1], ends[1:]))
+        in_parts(compute, size, threads)
     except MdfconvError:
         # What is wrong is said of all the values, not of a part.
         return function(values)

@@ -31,7 +31,7 @@ _SMALLEST_BLOCK = 512
 _BLOCKS_AT_LEAST = 24
 # Smaller arrays are done sooner than threads are started; a few parts for each thread even out
 # what the others are kept from.
-WORTH_THREADS, PARTS_A_THREAD = 1 << 20, 4
+_WORTH_THREADS, _PARTS_A_THREAD = 1 << 20, 4
 
 
 def as_operand(values: ArrayLike) -> Any:
@@ -108,7 +108,6 @@ def evaluate(kernel: Kernel, beta: ArrayLike, *operands: ArrayLike, threads: int
     numpy.ndarray or numpy scalar
         The values, in the broadcast shape.
     """
-    check_threads(threads)
     inputs = [as_operand(beta), *(as_operand(operand) for operand in operands)]
     dtype, result_dtype = computing_dtype(*inputs)
     arrays = [np.asarray(value) for value in inputs]
@@ -126,12 +125,7 @@ def evaluate(kernel: Kernel, beta: ArrayLike, *operands: ArrayLike, threads: int
         buffersize=min(_LARGEST_BLOCK, max(_SMALLEST_BLOCK, size // _BLOCKS_AT_LEAST)),
     )
     with iterator:
-        if threads > 1 and size >= WORTH_THREADS:
-            ends = np.linspace(0, size, threads * PARTS_A_THREAD + 1).astype(int).tolist()
-            with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(partial(_run, kernel, iterator), ends[:-1], ends[1:]))
-        else:
-            _run(kernel, iterator, 0, size)
+        in_parts(partial(_run, kernel, iterator), size, threads)
         result: Any = iterator.operands[-1]
     if result.dtype == result_dtype:
         return result[()]
@@ -156,12 +150,38 @@ def _run(kernel: Kernel, iterator: Any, start: int, end: int) -> None:
                 out[np.abs(angle) > horizon] = 0
 
 
-def check_threads(threads: int) -> None:
-    """Raise MdfconvError unless so many threads can run."""
+def worth_threads(size: int, threads: int) -> bool:
+    """Return whether several threads pay; raise `MdfconvError` unless so many can run."""
     if not isinstance(threads, int | np.integer):
         raise MdfconvError(f"threads are counted, not {threads!r}")
     if threads < 1:
         raise MdfconvError(f"{threads} threads: at least 1")
+    return threads > 1 and size >= _WORTH_THREADS
+
+
+def in_parts(run: Callable[[int, int], None], size: int, threads: int) -> None:
+    """Run over a range, a large one in parts by several threads.
+
+    Parameters
+    ----------
+    run : callable
+        Does the part from one index to another.
+    size : int
+        The range is from 0 to here.
+    threads : int
+        How many run at a time, from 1.
+
+    Raises
+    ------
+    MdfconvError
+        If the number of threads makes no sense.
+    """
+    if not worth_threads(size, threads):
+        run(0, size)
+        return
+    ends = np.linspace(0, size, threads * _PARTS_A_THREAD + 1).astype(int).tolist()
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(run, ends[:-1], ends[1:]))
 
 
 def inverse_square(values: Array) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from mdfconv.brdf.directions import polar_angle
 from mdfconv.brdf.fresnel import dielectric, schlick_fresnel
 from mdfconv.brdf.masking import v_cavity
 from mdfconv.distributions import Distribution, distribution
@@ -36,9 +37,9 @@ _NARROWEST, _WIDEST, _CANDIDATES, _GAMMAS = 1e-3, 10.0, 40, 5
 # F₀ of a dielectric and of a dark metal, between which a search finds its way.
 _STARTS = (0.04, 0.5)
 _LEAST_F0, _MOST_F0 = 1e-4, 1 - 1e-4
-# Of so many samples a scan, and a fit near which that of all lies, is made.
-_SCANNED, _SOME = 2_000, 20_000
-_STEPS, _SMALLEST_STEP = 3, 1e-6
+# Of so many samples a scan is made, and of so many a fit, from which some steps lead to that of
+# all.
+_SCANNED, _SOME, _STEPS, _SMALLEST_STEP = 600, 3_000, 4, 1e-6
 _SEED = 0
 _DIFFERENCE = 1e-5
 _INSIDE = 1e-9
@@ -203,7 +204,7 @@ class _Geometry:
         if not keep.any():
             raise MdfconvError("no sample is positive: a logarithmic loss has nothing to fit")
         half = replace(data, incident=incident, outgoing=outgoing).half
-        self.beta = np.arctan2(np.hypot(half[:, 0], half[:, 1]), half[:, 2])
+        self.beta = polar_angle(half)
         self.difference = np.clip(np.einsum("ij,ij->i", incident, half), 0, 1)
         self.cosines = np.stack([incident[:, 2], outgoing[:, 2]])
         self.tangents = np.stack(
@@ -345,13 +346,17 @@ class _Problem:
         return sorted(starts, key=self.cost)[:3]
 
     def descend(self, point: Array) -> Array:
-        """Return the minimum near a point: a few Gauss-Newton steps."""
+        """Return the minimum near a point: a few Gauss-Newton steps, or a search if they rise."""
+        start, before = point, np.inf
         for _ in range(_STEPS):
             lobe, slopes = self._lobe(point), self._slopes(point)
             residual, gain, _, scale = self._projection(lobe)
+            cost = float(np.sum(np.square(residual)))
+            if cost > before * (1 + _SMALLEST_STEP):
+                return self.refine(start)
             slope = projected_slope(lobe, slopes, gain, scale)
             step = np.linalg.lstsq(slope.T @ slope, slope.T @ residual.ravel(), rcond=None)[0]
-            point = np.clip(point - step, *self._bounds)
+            point, before = np.clip(point - step, *self._bounds), cost
             if np.abs(step).max() < _SMALLEST_STEP:
                 break
         return point
@@ -432,7 +437,7 @@ class _Problem:
     def _at_ends(self, point: Array) -> Iterator[str]:
         for name, value, low, high in zip(self._names, point, *self._bounds, strict=True):
             if min(value - low, high - value) < _AT_END:
-                yield f"{name} of {self._target.name} is at the end of its range"
+                yield f"{name} is at the end of its range"
 
     def _at(self, point: Array) -> Distribution:
         """Return the distribution with the γ of a point."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mdfconv.brdf.directions import direction, half_vector
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 
@@ -39,9 +40,7 @@ class DirectionalSamples:
     @property
     def half(self) -> Array:
         """The half vectors, shape (n, 3)."""
-        total = self.incident + self.outgoing
-        half: Array = total / np.linalg.norm(total, axis=1, keepdims=True)
-        return half
+        return half_vector(self.incident, self.outgoing)
 
 
 def directional_samples(
@@ -86,14 +85,9 @@ def directional_samples(
     if not keep.any():
         raise MdfconvError(f"{path}: no finite sample above the horizon")
     return DirectionalSamples(
-        _direction(theta_incident[keep], phi_incident[keep]),
-        _direction(theta_outgoing[keep], phi_outgoing[keep]),
+        direction(theta_incident[keep], phi_incident[keep]),
+        direction(theta_outgoing[keep], phi_outgoing[keep]),
         values[keep],
         channels,
         notes,
     )
-
-
-def _direction(theta: Array, phi: Array) -> Array:
-    sine = np.sin(theta)
-    return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=1)

@@ -14,7 +14,7 @@ import numpy as np
 from mdfconv.distributions.evaluation import Array
 
 # Gauss-Newton steps for the logarithms: at the right parameter six are exact under 50 % of noise.
-_LOG_STEPS, _LOG_TOLERANCE = 12, 1e-13
+_LOG_STEPS, _LOG_TOLERANCE = 12, 1e-11
 # Of the smallest sample, under the logarithmic loss: a model is kept positive, far from where a
 # fit ends.
 _SMALLEST_MODEL = 1e-3

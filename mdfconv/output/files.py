@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import errno
+import glob
 import os
 import shutil
 import signal
 import threading
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -15,6 +16,8 @@ from typing import Any
 
 from mdfconv.errors import MdfconvError
 
+# What commands call standard input.
+STANDARD_INPUT = "-"
 # What ends a process politely: it still puts its things away.
 _ENDS = ("SIGTERM", "SIGHUP")
 
@@ -27,6 +30,24 @@ def file_bytes(text: str) -> bytes:
 def is_stream(path: Path) -> bool:
     """Return whether a path is there and neither a file nor a folder: a device or a pipe."""
     return path.exists() and not path.is_file() and not path.is_dir()
+
+
+def find_files(patterns: Sequence[str]) -> list[Path]:
+    """Return the files that names and glob patterns stand for, each once; - for itself.
+
+    Raises
+    ------
+    MdfconvError
+        If one stands for nothing.
+    """
+    files: dict[Path, None] = {}
+    for pattern in patterns:
+        there = pattern == STANDARD_INPUT or Path(pattern).exists()
+        names = [pattern] if there else sorted(glob.glob(pattern, recursive=True))
+        if not names:
+            raise MdfconvError(f"cannot read {pattern}: No such file or directory")
+        files |= dict.fromkeys(map(Path, names))
+    return list(files)
 
 
 def create_folder(folder: Path) -> None:

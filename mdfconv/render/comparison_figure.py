@@ -27,7 +27,7 @@ _NARROWEST = 6.4
 # From the edges of the plot to its axes.
 _LEFT, _RIGHT, _ABOVE, _BENEATH = 0.6, 0.14, 0.4, 0.45
 _LOWEST = 1e-3  # of the reference's peak: where the section is cut off
-_BACKGROUND = 0.05  # linear light, so that the silhouette shows
+BACKGROUND = 0.05  # linear light, so that the silhouette shows
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def _draw_pictures(figure: Any, comparison: Comparison, layout: _Layout) -> None
     """Draw the pictures as one image, pixel for pixel, with their captions and rules."""
     sheet = np.full((layout.height, layout.width, 4), 255, np.uint8)
     coverage = Frame(layout.size).normals()[1].reshape(layout.size, layout.size)
-    background = (1 - coverage) * _BACKGROUND
+    background = (1 - coverage) * BACKGROUND
 
     def write(x: float, y: float, text: str, **style: Any) -> None:
         figure.text(x / layout.width, 1 - y / layout.height, text, ha="center", **style)

@@ -18,7 +18,7 @@ VIEW = np.array([0.0, 0.0, 1.0])
 LIGHT = np.array([-0.5, 0.5, np.sqrt(0.5)])  # 45° off the viewer, from above left
 _AREA_HALF_SIDE = 0.15  # of the distance to the square light
 _AREA_SAMPLES = 8  # a side
-_MARGIN = 1.04  # half the picture, in radii
+MARGIN = 1.04  # half the picture, in radii
 # Some twenty vectors for each normal, as many as this, stay in the cache.
 _NORMALS_AT_ONCE = 8192
 
@@ -106,10 +106,10 @@ class Frame:
 
     def normals(self) -> tuple[Array, Array]:
         """Return the pixels' normals, shape (size², 3), and how far each is covered, 0 to 1."""
-        axis = _MARGIN * (2 * (np.arange(self.size) + 0.5) / self.size - 1)
+        axis = MARGIN * (2 * (np.arange(self.size) + 0.5) / self.size - 1)
         x, y = np.meshgrid(axis, -axis)
         radius = np.hypot(x, y)
-        pixel = 2 * _MARGIN / self.size
+        pixel = 2 * MARGIN / self.size
         coverage = np.clip((1 - radius) / pixel + 0.5, 0, 1)
         # A pixel that straddles the silhouette shows what lies just inside it.
         shrink = np.minimum(1, (1 - 0.25 * pixel) / np.maximum(radius, 1e-300))

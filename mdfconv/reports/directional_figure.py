@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mdfconv.brdf.directions import polar_angle
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.measured.brdf_fit import BrdfFit
 from mdfconv.measured.directional import DirectionalSamples
@@ -64,7 +65,7 @@ def _draw_row(
             panel.plot(angle, near[index], "-", color=color, label=label)
         residual.plot(angle, error[index], "-", color=color, linewidth=0.8)
     some = np.linspace(0, values.size - 1, min(values.size, _MOST_POINTS)).astype(int)
-    half = np.degrees(np.arccos(np.clip(data.half[some, 2], -1, 1)))
+    half = np.degrees(polar_angle(data.half[some]))
     scatter.plot(half, error[some], ".", color="0.3", markersize=2)
     logarithmic.set(title=fit.distribution.label)
     logarithmic.set_yscale("log", nonpositive="mask")
@@ -74,7 +75,7 @@ def _draw_row(
 
 def incidences(data: DirectionalSamples) -> Array:
     """Return the angles of incidence of samples, degrees, each once."""
-    angle = np.degrees(np.arccos(np.clip(data.incident[:, 2], -1, 1)))
+    angle = np.degrees(polar_angle(data.incident))
     whole = np.unique(np.round(angle / _SAME_ANGLE)) * _SAME_ANGLE
     found: Array = np.array([np.median(angle[np.abs(angle - a) <= _SAME_ANGLE]) for a in whole])
     return found
@@ -90,8 +91,8 @@ class _Scan:
     """
 
     def __init__(self, data: DirectionalSamples) -> None:
-        self._incidence = np.degrees(np.arccos(np.clip(data.incident[:, 2], -1, 1)))
-        outgoing = np.degrees(np.arccos(np.clip(data.outgoing[:, 2], -1, 1)))
+        self._incidence = np.degrees(polar_angle(data.incident))
+        outgoing = np.degrees(polar_angle(data.outgoing))
         (x, y), (u, v) = data.incident[:, :2].T, data.outgoing[:, :2].T
         along, side = -(x * u + y * v), x * v - y * u
         # Along the normal every plane is that of incidence.

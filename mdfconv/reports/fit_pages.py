@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from mdfconv.distributions.parameter import number_text
+from mdfconv.brdf.directions import polar_angle
 from mdfconv.measured.analysis import Analysis
 from mdfconv.measured.brdf_fit import BrdfFit
 from mdfconv.measured.directional import DirectionalSamples
@@ -65,13 +65,16 @@ def report_of(
     best, cheap = result.fits[0], result.simplest
     first = cheap.distribution.parameter
     value = cheap.parameters[first.name] if isinstance(cheap, BrdfFit) else cheap.parameters[0]
-    name = cheap.distribution.label
-    verdict = f"{name}, {first.symbol} = {number_text(value)}"
+    verdict = f"{cheap.distribution.name}, {first.symbol} = {value:.4g}"
+    if cheap.distribution.second_parameter:
+        verdict += (
+            f", {cheap.distribution.second_parameter.symbol} = {cheap.distribution.gamma:.4g}"
+        )
     if cheap is best:
         verdict += f": the best fit, error {best.error:.3g}"
     else:
         verdict += (
-            f": error {cheap.error:.3g}, simpler than {best.distribution.label} with "
+            f": error {cheap.error:.3g}, simpler than {best.distribution.name} with "
             f"{best.error:.3g}"
         )
     return FitReport(
@@ -88,14 +91,15 @@ def report_of(
 def _facts(analysis: Analysis) -> Iterator[str]:
     samples = analysis.samples
     channels = ", ".join(samples.channels)
-    yield f"{len(samples.values)} samples of {len(samples.channels)} channels: {channels}"
+    kind = "channel" if len(samples.channels) == 1 else "channels"
+    yield f"{len(samples.values)} samples, {kind} {channels}"
     if isinstance(samples, DirectionalSamples):
         angles = incidences(samples)
         if angles.size <= _NAMED:
             yield f"angles of incidence {', '.join(f'{angle:.3g}°' for angle in angles)}"
         else:
             yield f"{angles.size} angles of incidence, {angles[0]:.3g}° to {angles[-1]:.3g}°"
-        reflected = np.degrees(np.arccos(np.clip(samples.outgoing[:, 2], -1, 1)))
+        reflected = np.degrees(polar_angle(samples.outgoing))
         yield f"angles of reflection up to {reflected.max():.3g}°"
     else:
         low, high = np.degrees(samples.beta[[0, -1]])

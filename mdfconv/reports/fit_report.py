@@ -153,6 +153,7 @@ body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto
 table { border-collapse: collapse; font-size: 0.9rem; }
 th, td { border-bottom: 1px solid #8886; padding: 0.2rem 0.6rem; text-align: left; }
 div { overflow-x: auto; }
-pre { background: #8882; padding: 0.6rem; overflow-x: auto; }
+pre { background: #8882; padding: 0.6rem; white-space: pre-wrap; overflow-wrap: anywhere; }
+h1 { overflow-wrap: anywhere; }
 img { max-width: 100%; height: auto; background: white; }
 """

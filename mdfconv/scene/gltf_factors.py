@@ -12,12 +12,11 @@ from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.interpolation import errors_of_many
 from mdfconv.fitting.metrics import Metric
 
 # An exponent below this is that of a uniform lobe: the best roughness is 1 − 2e-7.
 _UNIFORM = 1e-6
-# From so many values on, their errors are read from a curve through some.
-_WORTH_A_CURVE, _KNOTS = 2048, 257
 
 
 @dataclass
@@ -168,19 +167,15 @@ def _errors(
     target: Endpoint,
     metric: Metric,
 ) -> Array:
-    """Return the errors that lobes keep; of many from a curve, within half a percent."""
-    pairs = answers.parameter[which], answers.result[which]
-    if values.size <= _WORTH_A_CURVE:
-        return _error(*pairs, source, target, metric)
-    # Knots where values are dense, none far from the next, more at the ends where errors bend.
-    spread = values[0] + np.ptp(values) * (1 - np.cos(np.linspace(0, np.pi, _KNOTS))) / 2
-    even = np.searchsorted(values, np.minimum(spread, values[-1]))
-    at = np.unique([*even, *np.linspace(0, values.size - 1, _KNOTS).astype(int)])
-    knots = _error(pairs[0][at], pairs[1][at], source, target, metric)
-    known = ~np.isnan(knots)
-    if not known.any():
-        return np.full(values.shape, np.nan)
-    return np.interp(values, values[at[known]], knots[known])
+    """Return the errors that lobes keep; of many from those of some."""
+    if values.min(initial=1.0) <= 0:
+        return _error(answers.parameter[which], answers.result[which], source, target, metric)
+
+    def error(values: Array) -> Array:
+        results, _ = _results(values, [0] * values.size, source, target, metric)
+        return _error(source.decode_legal(values), results, source, target, metric)
+
+    return errors_of_many(error, values)
 
 
 def _error(

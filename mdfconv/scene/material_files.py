@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,23 +26,6 @@ class Destination:
     source: Path
     output: Path
     backup: Path | None = None
-
-
-def find_files(patterns: Sequence[str]) -> list[Path]:
-    """Return the files that names and glob patterns stand for, each once.
-
-    Raises
-    ------
-    MdfconvError
-        If one stands for nothing.
-    """
-    files: dict[Path, None] = {}
-    for pattern in patterns:
-        names = [pattern] if Path(pattern).exists() else sorted(glob.glob(pattern, recursive=True))
-        if not names:
-            raise MdfconvError(f"cannot read {pattern}: No such file or directory")
-        files |= dict.fromkeys(map(Path, names))
-    return list(files)
 
 
 def choose_outputs(

@@ -11,7 +11,7 @@ from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.material_files import FileConversion
 from mdfconv.scene.mtl_statements import Line, lines, number, split_options
-from mdfconv.scene.shininess import error_of, exponent_of, roughness_of
+from mdfconv.scene.shininess import exponent_of, fit_error, roughness_of
 
 # Tools that write libraries end at 1000, some at 10000: more is likely of another scale.
 _LARGEST_USUAL = 1e4
@@ -189,10 +189,10 @@ def _converted(blocks: list[_Block], to: str, metric: Metric) -> list[Material |
     unique, index = np.unique(values[convertible], return_inverse=True)
     if to == To.roughness:
         answers = roughness_of(unique, metric)
-        errors = error_of(unique, answers, metric)
+        errors = fit_error(unique, metric)
     else:
         answers = exponent_of(unique, metric)
-        errors = error_of(answers, unique, metric)
+        errors = fit_error(answers, metric)
     results[convertible], rmse[convertible] = answers[index], errors[index]
     return [
         None if np.isnan(value) else _material(block, to, float(value), float(result), float(error))

@@ -15,6 +15,7 @@ from mdfconv.conversion.endpoint import endpoints
 from mdfconv.conversion.remaining_error import remaining_error
 from mdfconv.distributions.dialects import DIALECTS
 from mdfconv.distributions.evaluation import Array
+from mdfconv.fitting.interpolation import errors_of_many
 from mdfconv.fitting.metrics import Metric
 
 SHININESS, ROUGHNESS = "blinn-phong", "ggx:roughness"
@@ -98,6 +99,15 @@ def error_of(exponent: Array, roughness: Array, metric: Metric) -> Array:
         metric,
     )
     return rmse
+
+
+def fit_error(exponent: Array, metric: Metric) -> Array:
+    """Return `error_of` the roughness that fits best, shape (n,); of many to 1e-4."""
+
+    def error(exponent: Array) -> Array:
+        return error_of(exponent, roughness_of(exponent, metric), metric)
+
+    return errors_of_many(error, np.maximum(exponent, _LEAST))
 
 
 # The programs that store a roughness for an exponent, and render it with GGX.

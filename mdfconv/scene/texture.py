@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -12,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mdfconv.errors import MdfconvError, MdfconvWarning
-from mdfconv.scene.image_files import blank, check_files, open_picture, staged
-from mdfconv.scene.image_picture import Picture
+from mdfconv.scene.image_channels import find_channels
+from mdfconv.scene.images import Form, check_files, check_output, open_picture, written
 from mdfconv.scene.texture_map import BLOCK, TexelMap, TextureReport
 from mdfconv.scene.texture_rule import TextureRule
 from mdfconv.scene.texture_values import ValueConverter
@@ -89,20 +90,23 @@ def convert_texture_file(
     max_pixels: int | None = None,
     progress: Progress | None = None,
 ) -> TextureReport:
-    """Convert a texture in a PNG, TIFF or OpenEXR file, and write it to another.
+    """Convert a texture in a PNG, TIFF, TGA or OpenEXR file, and write it to another.
 
     The other channels, the ICC profile and the resolution are kept, bit by bit unless the depth
-    changes. Values are taken as they are stored: a profile is not applied.
+    changes, and a TIFF's orientation. Values are taken as they are stored: a profile is not
+    applied.
 
     Parameters
     ----------
     source, output : str or Path
-        The files; their names end in what they hold: .png, .tif, .tiff or .exr. EXR becomes
-        EXR, PNG and TIFF become either. An existing output is replaced, whole or not at all.
+        The files; their names end in what they hold: .png, .tif, .tiff, .tga or .exr. EXR becomes
+        EXR, a TIFF of floats a TIFF, and the others become any of the others. An existing output
+        is replaced, whole or not at all.
     rule : TextureRule
         What to convert, and how.
     channel : str, optional
-        r, g, b, a or l (grey), in EXR the channel's name; needed if there is more than one.
+        r, g, b, a or l (grey), in EXR the channel's name; several as ``"rgb"`` or ``"r,g"``, as
+        for grey that is stored as colour. Needed if there is more than one.
     depth : int, optional
         8 or 16 bits for the result; kept if not given.
     dither : bool
@@ -110,14 +114,15 @@ def convert_texture_file(
     lossy : bool
         Whether to accept a source whose compression has altered its values, such as JPEG.
     max_pixels : int, optional
-        The largest picture that is decoded; Pillow's limit if not given.
+        The largest picture that is decoded; 2²⁷ (134217728) if not given.
     progress : callable, optional
         ``progress(description, total)``, a context that yields what advances by so many rows.
 
     Returns
     -------
     TextureReport
-        How many texels were clamped and why, and histograms before and after.
+        How many texels were clamped and why, and histograms before and after, over all chosen
+        channels.
 
     Raises
     ------
@@ -127,35 +132,42 @@ def convert_texture_file(
     source, output = Path(source), Path(output)
     ValueConverter(rule)  # names are wrong more often than files
     source_form, form = check_files(source, output, lossy=lossy)
-    with staged(output) as beside:
-        picture = open_picture(source, source_form, channel, lossy=lossy, max_pixels=max_pixels)
-        convert = TexelMap(rule, picture.dtype, depth, picture.width if dither else None)
-        same_depth = convert.dtype == picture.dtype
-        converted = picture if same_depth else blank(picture, convert.dtype)
-        with progress("rows", picture.height) if progress else nullcontext(_ignore) as advance:
-            _convert(picture, converted, convert, advance)
-        converted.save(beside, form)
-    return convert.report()
+    with open_picture(
+        source,
+        source_form,
+        lossy=lossy,
+        max_pixels=max_pixels,
+        upright=form not in (Form.tiff, Form.exr),
+    ) as picture:
+        channels = find_channels(source, picture.names, channel)
+        dtype = picture.dtype_of(channels)
+        width = picture.width if dither else None
+        convert = TexelMap(rule, dtype, depth, width, channels=len(channels))
+        check_output(picture, form, convert.dtype)
+        with (
+            written(output, form, picture, convert.dtype) as write,
+            progress("rows", picture.height) if progress else nullcontext(_ignore) as advance,
+        ):
+            for block in picture.blocks(BLOCK):
+                write(_converted(block, channels, convert))
+                advance(len(block))
+        return replace(convert.report(), remark=picture.remark())
 
 
-def _convert(
-    picture: Picture, converted: Picture, convert: TexelMap, advance: Callable[[int], None]
-) -> None:
-    """Convert row by row, into the same picture or into one of another depth."""
-    step = _rows_a_block(picture.width)
-    for top in range(0, picture.height, step):
-        block = picture.read(top, min(top + step, picture.height))
-        channel = convert(block[..., picture.channel])
-        block = _rescaled(block, convert.dtype)
-        block[..., picture.channel] = channel
-        converted.write(top, block)
-        advance(len(block))
+def _converted(block: NDArray[Any], channels: tuple[int, ...], convert: TexelMap) -> NDArray[Any]:
+    """Return some rows with the chosen channels converted, and the others in their depth."""
+    rescaled = _rescaled(block, convert.dtype)
+    for place, channel in enumerate(channels):
+        # Of floats of several types the block has the widest.
+        texels = block[..., channel].astype(convert.source_dtype, copy=False)
+        rescaled[..., channel] = convert(texels, place)
+    return rescaled
 
 
 def _rescaled(block: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
     """Return the channels that are not converted in the depth of the result."""
-    if block.dtype == dtype:
-        return block
+    if block.dtype == dtype or dtype.kind == "f":
+        return block.copy()
     if dtype == np.uint16:
         return block * np.uint16(257)
     return np.rint(block / np.float32(257)).astype(np.uint8)

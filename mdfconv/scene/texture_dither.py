@@ -6,6 +6,8 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
+# Rows that are rounded together, of a narrow picture: the memory grows with their square.
+_ROWS = 256
 _RIGHT, _BELOW_LEFT, _BELOW, _BELOW_RIGHT = (np.float32(part / 16) for part in (7, 3, 5, 1))
 
 
@@ -40,9 +42,14 @@ class ErrorDiffusion:
         -------
         numpy.ndarray of uint8, shape (rows, width)
         """
-        rows, width = levels.shape
         if levels.size == 0:
             return levels.astype(np.uint8)
+        step = max(_ROWS, self._width)
+        parts = [self._round(levels[top : top + step]) for top in range(0, len(levels), step)]
+        return np.concatenate(parts)
+
+    def _round(self, levels: NDArray[np.float32]) -> NDArray[np.uint8]:
+        rows, width = levels.shape
         # Texels with the same x + 2y wait for none of each other: they are one row of the
         # sheared picture, and one step.
         steps = width + 2 * (rows - 1)

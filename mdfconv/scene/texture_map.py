@@ -69,6 +69,8 @@ class TextureReport:
         How many were answered, and how many were treated as `ValueConverter` says.
     before, after : numpy.ndarray of int, shape (256,)
         Histograms of the stored values from 0 to 1; without NaN.
+    remark : str
+        What else the user must know; "" if nothing.
     """
 
     source: str
@@ -78,6 +80,7 @@ class TextureReport:
     outcomes: dict[Outcome, int]
     before: NDArray[np.int64]
     after: NDArray[np.int64]
+    remark: str = ""
 
     def notes(self, *, ends: bool = True) -> list[str]:
         """Return what the user must know; `ends` includes mirrors and uniform lobes."""
@@ -91,11 +94,12 @@ class TextureReport:
         }
         if not ends:
             del texts[Outcome.MIRROR], texts[Outcome.UNIFORM]
-        return [
+        counts = [
             f"{self.outcomes[outcome]} of {self.texels} texels are {text}"
             for outcome, text in texts.items()
             if self.outcomes[outcome]
         ]
+        return [*counts, self.remark] if self.remark else counts
 
 
 class TexelMap:
@@ -111,6 +115,8 @@ class TexelMap:
         Bits of the result, 8 or 16; None keeps the type.
     width : int or None
         Texels a row, to diffuse the errors of rounding; None rounds each texel for itself.
+    channels : int
+        How many channels are converted, whose errors do not mix.
 
     Raises
     ------
@@ -119,30 +125,36 @@ class TexelMap:
     """
 
     def __init__(
-        self, rule: TextureRule, dtype: np.dtype[Any], depth: int | None, width: int | None = None
+        self,
+        rule: TextureRule,
+        dtype: np.dtype[Any],
+        depth: int | None,
+        width: int | None = None,
+        *,
+        channels: int = 1,
     ) -> None:
         self.dtype = result_type(dtype, depth, width is not None)
-        self._source_dtype = dtype.newbyteorder("=")
+        self.source_dtype = dtype.newbyteorder("=")
         self._convert = ValueConverter(rule)
-        self._dither = None if width is None else ErrorDiffusion(width)
+        self._dither = [] if width is None else [ErrorDiffusion(width) for _ in range(channels)]
         self._outcomes = np.zeros(len(Outcome), np.int64)
         self._before, self._after = (np.zeros(BINS, np.int64) for _ in range(2))
-        self._table = self._tabled() if self._source_dtype in _TABLED else None
+        self._table = self._tabled() if self.source_dtype in _TABLED else None
 
-    def __call__(self, block: NDArray[Any]) -> NDArray[Any]:
-        """Convert some texels, any shape; with dither the next rows, shape (rows, width)."""
-        texels = block.astype(self._source_dtype, copy=False)
+    def __call__(self, block: NDArray[Any], channel: int = 0) -> NDArray[Any]:
+        """Convert some texels, any shape; with dither the next rows of a channel."""
+        texels = block.astype(self.source_dtype, copy=False)
         if self._table is None:
             values, outcomes = self._convert(texels.astype(np.float64))
             converted: NDArray[Any] = values.astype(self.dtype)
             self._outcomes += np.bincount(outcomes.ravel(), minlength=len(Outcome))
             self._before += _histogram(texels)
         else:
-            key = texels.view(f"u{self._source_dtype.itemsize}")
+            key = texels.view(f"u{self.source_dtype.itemsize}")
             self._counts += np.bincount(key.ravel(), minlength=self._counts.size)
             converted = self._table[key]
             if self._dither:
-                converted = self._dither(converted)
+                converted = self._dither[channel](converted)
         self._after += _histogram(converted)
         return converted
 
@@ -164,12 +176,12 @@ class TexelMap:
 
     def _tabled(self) -> NDArray[Any]:
         """Return the answer for every value of the type, in levels if it is dithered."""
-        every = np.arange(1 << 8 * self._source_dtype.itemsize).astype(
-            f"u{self._source_dtype.itemsize}"
+        every = np.arange(1 << 8 * self.source_dtype.itemsize).astype(
+            f"u{self.source_dtype.itemsize}"
         )
         self._counts = np.zeros(every.size, np.int64)
-        stored = every.view(self._source_dtype).astype(np.float64)
-        if self._source_dtype.kind == "u":
+        stored = every.view(self.source_dtype).astype(np.float64)
+        if self.source_dtype.kind == "u":
             stored /= every[-1]
         values, self._table_outcomes = self._convert(stored)
         if self.dtype.kind == "f":
@@ -178,8 +190,8 @@ class TexelMap:
         return levels.astype(np.float32) if self._dither else np.rint(levels).astype(self.dtype)
 
     def _histogram_of_counts(self) -> NDArray[np.int64]:
-        every = np.arange(self._counts.size).astype(f"u{self._source_dtype.itemsize}")
-        texels = every.view(self._source_dtype)
+        every = np.arange(self._counts.size).astype(f"u{self.source_dtype.itemsize}")
+        texels = every.view(self.source_dtype)
         known = ~np.isnan(texels)
         before = np.zeros(BINS, np.int64)
         np.add.at(before, _bins(texels[known]), self._counts[known])

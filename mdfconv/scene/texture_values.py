@@ -95,7 +95,8 @@ class ValueConverter:
         with np.errstate(invalid="ignore"):
             outcome[np.abs(result - value) > _ROUNDING] = Outcome.CLAMPED
         if not answered.all():
-            smooth = (clipped < 0.5) == (self._smoothest == 0)
+            with np.errstate(invalid="ignore"):
+                smooth = self._roughness(clipped) < self._middle
             ends = np.where(smooth, self._smoothest_answer, 1 - self._smoothest_answer)
             value = np.where(legal, value, ends)
             outcome[~legal] = np.where(smooth, Outcome.MIRROR, Outcome.UNIFORM)[~legal]
@@ -148,6 +149,13 @@ class ValueConverter:
         grid, answers = grid[answered], answers[answered]
         index = int(np.argmax(self._roughness(grid)))
         return grid[index], float(np.clip(answers[index], 0, 1))
+
+    @cached_property
+    def _middle(self) -> float:
+        """A roughness in the middle of those that the source takes."""
+        grid = np.linspace(0, 1, _GRID)
+        rough = self._roughness(grid[~np.isnan(self._source.decode_legal(grid))])
+        return 0.5 * float(rough.min() + rough.max()) if rough.size else 0.5
 
     def _roughness(self, stored: Array) -> Array:
         """Return numbers that rise with the roughness."""

@@ -22,6 +22,18 @@ COMMANDS = GROUP.list_commands(None)
 FREE = {
     "gltf": {"--from", "--to", "--output"},
     "mtl": {"--to", "--output"},
+    "mitsuba": {"--to", "--output"},
+    "fit": {
+        "--gamma",
+        "--angle",
+        "--theta-i",
+        "--phi-i",
+        "--theta-o",
+        "--phi-o",
+        "--fresnel",
+        "--values",
+        "--angle-unit",
+    },
     "convert": {"--gamma"},
     "recommend": {"--gamma"},
     "formula": {"--gamma", "--range"},

@@ -1,6 +1,7 @@
 """Textures as arrays: what each texel becomes, by which rule, and what rounding leaves."""
 
 import doctest
+import tracemalloc
 import warnings
 
 import numpy as np
@@ -255,6 +256,17 @@ def test_dither_against_the_loop():
     assert np.mean(found != one_by_one(picture.astype(float))) < 0.01
 
 
+@pytest.mark.parametrize("shape", [(70000, 1), (3000, 2), (1, 70000)])
+def test_dither_of_narrow_pictures(shape):
+    tracemalloc.start()
+    levels = np.full(shape, 100.4, np.float32)
+    found = ErrorDiffusion(shape[1])(levels)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 64 * levels.size + 4e6
+    assert set(np.unique(found)) == {100, 101}
+
+
 def test_dither_shows_what_rounding_hides():
     grey = np.full((64, 64), 20000, np.uint16)
     rule = TextureRule("ggx:roughness", "ggx:alpha")
@@ -307,3 +319,11 @@ def test_rules_that_are_none(rule, words):
 def test_docstring_example():
     found = doctest.testmod(texture_module)
     assert (found.failed, found.attempted > 0) == (0, True)
+
+
+def test_what_is_too_rough_for_the_target_is_the_roughest():
+    """pbrt-v3's roughness is beyond GGX from 0.45 on: not a mirror because it is below a half."""
+    texels = np.linspace(0, 1, 101, dtype=np.float32)[None]
+    converted = convert_texture(texels, TextureRule("ggx:pbrt-v3", "ggx:roughness"))
+    assert np.all(np.diff(converted[0]) >= 0)
+    assert converted[0, 50:].min() == 1

@@ -6,6 +6,7 @@ from PIL import Image
 
 from mdfconv.scene import TextureRule, convert_texture
 from tests.cli.runner import run, run_on_terminal
+from tests.scene.pictures import PROFILE
 
 
 @pytest.fixture
@@ -48,6 +49,24 @@ def test_options_reach_the_rule(texture):
         # N = 256 v, v' = log2(N) / 8
         expected = 255 * np.log2(256 * np.arange(1, 256) / 255) / 8
         assert np.abs(np.asarray(found)[:, 1:] - expected.clip(0)).max() <= 1
+
+
+def test_grey_stored_as_colour(texture):
+    with Image.open(texture) as image:
+        image.convert("RGB").save(texture, icc_profile=PROFILE)
+    status, _, err = run(*arguments(texture), "--channel", "rgb")
+    assert status == 0
+    assert "note: " in err
+    assert "a colour profile (sRGB built-in), which is not for data" in err
+    with Image.open(texture.parent / "rough.png") as found:
+        red, green, blue = (np.asarray(band) for band in found.split())
+        assert found.info["icc_profile"] == PROFILE
+    assert np.array_equal(red, green)
+    assert np.array_equal(red, blue)
+    assert len(np.unique(red)) > 50
+    status, out, err = run(*arguments(texture, output="new.png"), "--channel", "rg,")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert not (texture.parent / "new.png").exists()
 
 
 @pytest.mark.parametrize(

@@ -7,12 +7,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from mdfconv import MdfconvError
 from mdfconv.scene import TextureRule, convert_texture, convert_texture_file
 from mdfconv.scene import texture as texture_module
 from tests.scene.pictures import (
     PROFILE,
+    exr_header,
+    png_chunks,
     read,
     read_exr,
+    read_tiff,
     samples,
     write_exr,
     write_png,
@@ -57,10 +61,13 @@ def test_png_keeps_all_but_the_channel(
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
 @pytest.mark.parametrize("channels", [1, 3, 4])
-@pytest.mark.parametrize("compression", ["none", "lzw", "deflate"])
-def test_tiff_to_tiff_and_png(tmp_path, dtype, channels, compression):
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"deflate": True, "rows": 4}, {"order": ">", "rows": 5}, {"planes": True, "rows": 6}],
+)
+def test_tiff_to_tiff_and_png(tmp_path, dtype, channels, options):
     texels = samples(31, 17, channels, dtype)
-    source = write_tiff(tmp_path / "a.tif", texels, compression=compression)
+    source = write_tiff(tmp_path / "a.tif", texels, **options)
     expected = texels.copy()
     expected[..., -1] = convert_texture(texels[..., -1], RULE)
     name = {1: "l", 3: "b", 4: "a"}[channels]
@@ -71,12 +78,144 @@ def test_tiff_to_tiff_and_png(tmp_path, dtype, channels, compression):
             assert image.info["dpi"] == pytest.approx((101.6, 203.2), rel=1e-3)
 
 
-def test_big_endian_and_rotated_tiff(tmp_path):
-    texels = samples(9, 5, 1, np.uint16)
-    Image.fromarray(texels[..., 0].astype(">u2")).save(tmp_path / "a.tif", tiffinfo={274: 6})
-    convert_texture_file(tmp_path / "a.tif", tmp_path / "b.tif", RULE)
-    expected = convert_texture(np.rot90(texels[..., 0], -1), RULE)
-    assert np.array_equal(read(tmp_path / "b.tif")[..., 0], expected)
+def test_lzw(tmp_path):
+    texels = samples(31, 17, 3, np.uint8)
+    Image.fromarray(texels).save(tmp_path / "a.tif", compression="tiff_lzw")
+    convert_texture_file(tmp_path / "a.tif", tmp_path / "b.tif", RULE, channel="r")
+    texels[..., 0] = convert_texture(texels[..., 0], RULE)
+    assert np.array_equal(read(tmp_path / "b.tif"), texels)
+
+
+UPRIGHT = {
+    1: lambda rows: rows,
+    2: np.fliplr,
+    3: lambda rows: np.rot90(rows, 2),
+    4: np.flipud,
+    5: lambda rows: rows.swapaxes(0, 1),
+    6: lambda rows: np.rot90(rows, -1),
+    7: lambda rows: np.rot90(rows.swapaxes(0, 1), 2),
+    8: np.rot90,
+}
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("orientation", UPRIGHT)
+def test_orientation_stays_in_tiff_and_is_applied_elsewhere(tmp_path, orientation, channels, dtype):
+    texels = samples(9, 5, channels, dtype)
+    source = write_tiff(tmp_path / "a.tif", texels, tags={274: [orientation]})
+    texels[..., -1] = convert_texture(texels[..., -1], RULE)
+    channel = "l" if channels == 1 else "b"
+    convert_texture_file(source, tmp_path / "b.tif", RULE, channel=channel)
+    found, tags = read_tiff(tmp_path / "b.tif")
+    assert tags[274] == (orientation,)
+    assert np.array_equal(found, texels)
+    convert_texture_file(source, tmp_path / "b.png", RULE, channel=channel)
+    assert np.array_equal(read(tmp_path / "b.png"), UPRIGHT[orientation](texels))
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64])
+@pytest.mark.parametrize("channels", [1, 3])
+def test_float_tiff(tmp_path, channels, dtype):
+    texels = np.random.default_rng(0).random((17, 31, channels)).astype(dtype)
+    source = write_tiff(tmp_path / "a.tif", texels, deflate=True, rows=4)
+    name = None if channels == 1 else "g"
+    place = min(1, channels - 1)
+    convert_texture_file(source, tmp_path / "b.tif", RULE, channel=name)
+    found = read(tmp_path / "b.tif")
+    texels[..., place] = convert_texture(texels[..., place], RULE)
+    assert found.dtype == dtype
+    assert np.array_equal(found, texels)
+
+
+def test_a_fifth_channel_stays_in_a_tiff(tmp_path):
+    texels = samples(9, 5, 5, np.uint16)
+    source = write_tiff(tmp_path / "a.tif", texels, tags={338: [0, 0]})
+    convert_texture_file(source, tmp_path / "b.tif", RULE, channel="g")
+    texels[..., 1] = convert_texture(texels[..., 1], RULE)
+    assert np.array_equal(read(tmp_path / "b.tif"), texels)
+    with pytest.raises(MdfconvError, match="which PNG does not hold"):
+        convert_texture_file(source, tmp_path / "b.png", RULE, channel="g")
+
+
+@pytest.mark.parametrize("orientation", [-1, 1])
+@pytest.mark.parametrize("compression", [None, "tga_rle"])
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_tga(tmp_path, channels, compression, orientation):
+    texels = samples(9, 5, channels, np.uint8)
+    image = Image.fromarray(texels[..., 0] if channels == 1 else texels)
+    image.save(tmp_path / "a.tga", compression=compression, orientation=orientation)
+    texels[..., -1] = convert_texture(texels[..., -1], RULE)
+    name = {1: "l", 3: "b", 4: "a"}[channels]
+    for output in (tmp_path / "b.tga", tmp_path / "b.png"):
+        convert_texture_file(tmp_path / "a.tga", output, RULE, channel=name)
+        with Image.open(output) as found:
+            assert np.array_equal(np.asarray(found).reshape(texels.shape), texels)
+
+
+@pytest.mark.parametrize("name", ["rgb", "r,G,b", "RGB", "bgr"])
+@pytest.mark.parametrize("dither", [False, True])
+def test_several_channels(tmp_path, name, dither):
+    grey = samples(40, 30, 1, np.uint8)
+    source = write_png(tmp_path / "a.png", np.dstack([grey, grey, grey, grey[::-1]]))
+    report = convert_texture_file(source, tmp_path / "b.png", RULE, channel=name, dither=dither)
+    found = read(tmp_path / "b.png")
+    expected = convert_texture(grey[..., 0], RULE, dither=dither)
+    assert all(np.array_equal(found[..., place], expected) for place in range(3))
+    assert np.array_equal(found[..., 3], grey[::-1, :, 0])
+    assert report.texels == 3 * 40 * 30
+
+
+@pytest.mark.parametrize("more", [[(b"sRGB", b"\0")], [(b"gAMA", (45455).to_bytes(4))]])
+def test_a_gamma_is_told_of_and_kept(tmp_path, more):
+    texels = samples(8, 8, 1, np.uint8)
+    source = write_png(tmp_path / "a.png", texels, more=more)
+    report = convert_texture_file(source, tmp_path / "b.png", RULE)
+    assert "gamma" in report.notes()[-1]
+    assert [name for name, _ in png_chunks(tmp_path / "b.png")] == [
+        *(b"IHDR", more[0][0]),
+        *(b"IDAT", b"IEND"),
+    ]
+
+
+def test_no_gamma_is_invented(tmp_path):
+    for more in ([], [(b"gAMA", (100000).to_bytes(4))]):
+        source = write_png(tmp_path / "a.png", samples(8, 8, 1, np.uint8), more=more)
+        report = convert_texture_file(source, tmp_path / "b.png", RULE)
+        assert not any("gamma" in note for note in report.notes())
+        kept = [name for name, _ in more]
+        names = [name for name, _ in png_chunks(tmp_path / "b.png")]
+        assert names == [b"IHDR", *kept, b"IDAT", b"IEND"]
+
+
+@pytest.mark.parametrize("profile", [PROFILE, b"no profile", PROFILE[:200], bytes(200)])
+def test_profiles_are_kept_whatever_they_hold(tmp_path, profile):
+    # A profile of colours belongs to no grey picture, and yet many have one.
+    for channels, name in ((1, "l"), (3, "g")):
+        texels = samples(8, 8, channels, np.uint8)
+        sources = (
+            write_png(tmp_path / "a.png", texels, icc=profile),
+            write_tiff(tmp_path / "a.tif", texels, tags={34675: profile}),
+        )
+        for source in sources:
+            report = convert_texture_file(source, tmp_path / "b.png", RULE, channel=name)
+            with Image.open(tmp_path / "b.png") as image:
+                assert image.info["icc_profile"] == profile
+            assert "a colour profile" in report.notes()[-1]
+            convert_texture_file(source, tmp_path / "b.tif", RULE, channel=name)
+            assert bytes(read_tiff(tmp_path / "b.tif")[1][34675]) == profile
+
+
+def test_the_same_file_each_time(tmp_path):
+    write_png(tmp_path / "a.png", samples(8, 8, 1, np.uint8))
+    write_exr(tmp_path / "a.exr", Y=np.ones((4, 4), np.float32))
+    for source, output in (("a.png", "b.png"), ("a.png", "b.tif"), ("a.exr", "b.exr")):
+        contents = set()
+        for _ in range(2):
+            convert_texture_file(tmp_path / source, tmp_path / output, RULE)
+            contents.add((tmp_path / output).read_bytes())
+        assert len(contents) == 1
+        assert b"capDate" not in contents.pop()
 
 
 @pytest.mark.parametrize("channels", [1, 3, 4])
@@ -140,10 +279,32 @@ def test_exr(tmp_path, dtype):
         assert file.header()["by"] == "hand"
 
 
+@pytest.mark.parametrize("lines", [OpenEXR.INCREASING_Y, OpenEXR.DECREASING_Y])
+def test_every_half_is_kept_in_windows_tiles_and_any_order(tmp_path, monkeypatch, lines):
+    monkeypatch.setattr(texture_module, "BLOCK", 256 * 40)
+    halves = np.arange(65536).astype(np.uint16).view(np.float16).reshape(256, 256)
+    rough = np.linspace(0, 1, 65536).reshape(256, 256).astype(np.float16)
+    corners = (np.array([-5, 7], np.int32), np.array([250, 262], np.int32))
+    headers = (
+        {"lineOrder": lines},
+        {"dataWindow": corners},
+        {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()},
+    )
+    for header in headers:
+        source = write_exr(tmp_path / "a.exr", header=header, R=halves, rough=rough)
+        convert_texture_file(source, tmp_path / "b.exr", RULE, channel="rough")
+        found = read_exr(tmp_path / "b.exr")
+        assert np.array_equal(found["R"].view(np.uint16), halves.view(np.uint16))
+        assert np.array_equal(found["rough"], convert_texture(rough, RULE))
+        given, written = (exr_header(tmp_path / name) for name in ("a.exr", "b.exr"))
+        assert written.pop("lineOrder") == str(OpenEXR.INCREASING_Y)
+        assert given.pop("lineOrder") == str(header.get("lineOrder", OpenEXR.INCREASING_Y))
+        assert written == given
+
+
 def test_exr_with_losses_is_written_without(tmp_path):
     channels = {name: np.random.default_rng(1).random((40, 40), np.float32) for name in "RG"}
-    with OpenEXR.File({"compression": OpenEXR.DWAA_COMPRESSION}, channels) as file:
-        file.write(str(tmp_path / "a.exr"))
+    write_exr(tmp_path / "a.exr", OpenEXR.DWAA_COMPRESSION, **channels)
     convert_texture_file(tmp_path / "a.exr", tmp_path / "b.exr", RULE, channel="r")
     before, after = (read_exr(tmp_path / name) for name in ("a.exr", "b.exr"))
     assert np.array_equal(after["G"], before["G"])

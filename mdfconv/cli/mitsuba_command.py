@@ -1,0 +1,159 @@
+"""``mdfconv mitsuba``."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mdfconv.cli.material_files import (
+    InPlaceOption,
+    ReportFormat,
+    ReportFormatOption,
+    ResultOption,
+    convert_files,
+    number_cell,
+)
+from mdfconv.cli.options import ExposureOption, MetricOption, chosen_metric
+from mdfconv.cli.tables import ROWS_SHOWN, print_table, rich_table, tell, tell_rest
+from mdfconv.errors import MdfconvError
+from mdfconv.output.records import json_text
+
+if TYPE_CHECKING:
+    from mdfconv.fitting.metrics import Metric
+    from mdfconv.scene.material_files import Destination
+    from mdfconv.scene.mitsuba import MitsubaConversion, Value
+
+_RIGHT = ("line", "α", "new α", "RMSE", "kept")
+
+
+def command(
+    scenes: Annotated[
+        list[str],
+        typer.Argument(metavar="IN.xml...", help="Scenes, or patterns such as '*.xml'."),
+    ],
+    output: ResultOption = None,
+    to: Annotated[
+        str, typer.Option(metavar="MDF", help="Distribution to convert to: ggx or beckmann.")
+    ] = "ggx",
+    metric: MetricOption = "environment",
+    exposure: ExposureOption = None,
+    in_place: InPlaceOption = False,
+    textures: Annotated[
+        bool,
+        typer.Option("--textures", help="Convert the bitmaps of alpha, too, beside the result."),
+    ] = False,
+    compare: Annotated[
+        bool,
+        typer.Option("--compare", help="Add what is left if alpha is kept: its error."),
+    ] = False,
+    format_: ReportFormatOption = ReportFormat.table,
+) -> None:
+    """Convert the distribution of rough BSDFs in Mitsuba scenes (0.6 and 3).
+
+    Changes distribution and alpha of roughconductor, roughdielectric, roughplastic and
+    roughcoating, or adds them where their defaults count; every other byte is kept. What has to
+    be left as it is, such as a textured alpha, is reported, and the exit status is 1.
+
+    Examples:
+
+    mdfconv mitsuba scene.xml -o scene-ggx.xml
+
+    mdfconv mitsuba --in-place --to beckmann --metric display 'scenes/*.xml'
+
+    mdfconv mitsuba scene.xml -o out --textures --compare --format json
+    """
+    from mdfconv.scene.mitsuba import check_target, convert_mitsuba
+    from mdfconv.scene.mitsuba_textures import BitmapConverter
+
+    wanted = check_target(to)
+    kept = chosen_metric(metric, exposure)
+
+    def convert(destination: Destination, data: bytes) -> MitsubaConversion:
+        paths = destination.source, destination.output
+        bitmaps = BitmapConverter(*paths, wanted, kept) if textures else None
+        try:
+            conversion = convert_mitsuba(data, wanted, metric=kept, texture=bitmaps)
+        except MdfconvError as error:
+            raise MdfconvError(f"{destination.source}: {error.reason}", error.hint) from None
+        if bitmaps is None:
+            return conversion
+        files = bitmaps.files({texture.result for texture in conversion.textures})
+        return dataclasses.replace(conversion, files=files)
+
+    def report(converted: list[tuple[Destination, MitsubaConversion]]) -> None:
+        if format_ is ReportFormat.json:
+            records = [_record(*each, wanted, kept, compare=compare) for each in converted]
+            typer.echo(json_text(records))
+            return
+        for each in converted:
+            record = _record(*each, wanted, kept, compare=compare, most=ROWS_SHOWN)
+            _print_table(record)
+            tell_rest(len(each[1].materials), "--format json")
+
+    convert_files(scenes, output, in_place=in_place, convert=convert, report=report)
+
+
+def _record(
+    destination: Destination,
+    conversion: MitsubaConversion,
+    target: str,
+    metric: Metric,
+    *,
+    compare: bool,
+    most: int | None = None,
+) -> dict[str, Any]:
+    """Return what is said of a scene, of its first materials if there is a limit."""
+    materials = [vars(each) | {"notes": list(each.notes)} for each in conversion.materials[:most]]
+    if compare:
+        from mdfconv.scene.mitsuba import unchanged_errors
+
+        errors = unchanged_errors(conversion.materials[:most], target, metric)
+        for row, error in zip(materials, errors, strict=True):
+            row["rmse_unchanged"] = error
+    return {
+        "file": str(destination.source),
+        "output": str(destination.output),
+        "target": target,
+        "metric": str(metric),
+        "materials": materials,
+        "textures": [vars(texture) for texture in conversion.textures],
+        "includes": [{"line": line, "file": file} for line, file in conversion.includes],
+        "problems": [{"line": line, "problem": text} for line, text in conversion.problems],
+    }
+
+
+def _print_table(record: dict[str, Any]) -> None:
+    """Print what was converted to standard error."""
+    rows = [
+        {
+            "BSDF": row["name"],
+            # With one column more, 80 are too few for both.
+            **({} if "rmse_unchanged" in row else {"line": str(row["line"])}),
+            "from": row["distribution"],
+            "α": _cell(row["value"]),
+            "new α": _cell(row["result"]),
+            "RMSE": number_cell(row["rmse"], 3),
+        }
+        | ({"kept": number_cell(row["rmse_unchanged"], 3)} if "rmse_unchanged" in row else {})
+        | {"notes": "; ".join(row["notes"])}
+        for row in record["materials"]
+    ]
+    if rows:
+        title = f"{record['file']}, {record['target']}, {record['metric']} metric"
+        print_table(rich_table(list(rows[0]), rows, title, right=_RIGHT), err=True)
+    else:
+        typer.echo(f"{record['file']}: nothing to convert", err=True)
+    for texture in record["textures"]:
+        typer.echo(
+            f"{texture['file']} became {texture['result']} (line {texture['line']})", err=True
+        )
+    for include in record["includes"]:
+        place = f"{record['file']}:{include['line']}"
+        tell(f"{place}: {include['file']} is included, and is not read: convert it, too")
+
+
+def _cell(value: Value) -> str:
+    axes = value if isinstance(value, tuple) else (value,)
+    return ", ".join(number_cell(axis, 5) for axis in axes)

@@ -1,0 +1,62 @@
+"""The files that measurements come in, each known by its content.
+
+A new format is a module that defines ``READER``, and one line in `_MODULES`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+from mdfconv.errors import MdfconvError
+from mdfconv.measured.directional import DirectionalSamples
+from mdfconv.measured.readers.base import Reader, ReadOptions, Source, open_source
+from mdfconv.measured.samples import Samples
+
+__all__ = ["ReadOptions", "Reader", "Source", "list_readers", "read"]
+
+# In the order in which they are asked: text reads what no other one knows.
+_MODULES = ("merl", "rgl", "alta", "zemax", "fred", "astm", "text")
+
+# The format whose cells can be chosen.
+_WITH_CELLS = "MERL"
+
+_READERS: tuple[Reader, ...] = tuple(
+    import_module(f"{__name__}.{module}").READER for module in _MODULES
+)
+
+
+def list_readers() -> list[str]:
+    """Return the names of the formats, in the order in which a file is tried."""
+    return [reader.name for reader in _READERS]
+
+
+def read(path: Path | str, options: ReadOptions | None = None) -> Samples | DirectionalSamples:
+    """Read measurements, whatever format they are in.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file; ``"-"`` is standard input.
+    options : ReadOptions, optional
+        Which columns of a table hold what, and in which unit.
+
+    Returns
+    -------
+    Samples or DirectionalSamples
+        Against one angle, or against two directions, as the file has them.
+
+    Raises
+    ------
+    MdfconvError
+        If the file cannot be read, is damaged, or leaves open what its numbers mean.
+    """
+    try:
+        source = open_source(path)
+    except OSError as error:
+        raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
+    options = options or ReadOptions()
+    reader = next(reader for reader in _READERS if reader.recognizes(source.path.name, source.head))
+    if options.cells is not None and reader.name != _WITH_CELLS:
+        raise MdfconvError(f"{source.path}: cells are those of a {_WITH_CELLS} file")
+    return reader.read(source, options)

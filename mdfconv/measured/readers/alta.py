@@ -1,0 +1,146 @@
+"""The ALTA library's data files, text or binary, in several of its parametrizations.
+
+Written after ``core/data.cpp`` and ``core/params.cpp`` of the library. V is the view, L the
+light; both point away from the surface.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from mdfconv.brdf.directions import azimuth, direction, polar_angle
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+from mdfconv.measured.directional import DirectionalSamples, directional_samples
+from mdfconv.measured.readers.angles import from_half_and_difference
+from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, decode_head
+from mdfconv.measured.readers.tables import parse_table
+from mdfconv.measured.samples import Samples, samples
+
+_TAG = re.compile(r"^#[ \t]*([A-Z_]+)[ \t]+([^\n]*?)\s*$", re.M)
+_DIMENSIONS = re.compile(r"^#\s*DIM\s+\S", re.M)
+_BEGIN = b"#BEGIN_STREAM"
+# Against the angle of the half vector alone, in this unit.
+_ONE_ANGLE = {"COS_TH": "cosine", "COS_TH_H": "cosine", "TH": "radians", "TH_H": "radians"}
+_WEIGHTED = "INV_STERADIAN_COSINE_FACTOR"
+_PLAIN = ("INV_STERADIAN", "RGB_COLOR")
+
+
+def _projected(x: Array) -> tuple[Array, Array]:
+    zero = np.zeros(len(x))
+    view = direction(np.hypot(x[:, 1], x[:, 2]), np.arctan2(x[:, 2], x[:, 1]))
+    return direction(x[:, 0], zero), view
+
+
+def _half_and_difference(x: Array) -> tuple[Array, Array]:
+    view, light = from_half_and_difference(x[:, 0], x[:, 1], x[:, 2], x[:, 3])
+    return light, view
+
+
+# Of the inputs, one row a sample: light and view, and how many inputs there are.
+_TWO_DIRECTIONS: dict[str, tuple[int, Callable[[Array], tuple[Array, Array]]]] = {
+    "ISOTROPIC_TL_TV_PROJ_DPHI": (3, _projected),
+    "ISOTROPIC_TV_TL_DPHI": (
+        3,
+        lambda x: (direction(x[:, 1], x[:, 2]), direction(x[:, 0], np.zeros(len(x)))),
+    ),
+    "SPHERICAL_TL_PL_TV_PV": (
+        4,
+        lambda x: (direction(x[:, 0], x[:, 1]), direction(x[:, 2], x[:, 3])),
+    ),
+    "RUSIN_TH_TD_PD": (3, lambda x: _half_and_difference(np.insert(x, 1, 0, axis=1))),
+    "RUSIN_TH_PH_TD_PD": (4, _half_and_difference),
+    "CARTESIAN": (6, lambda x: (x[:, 3:], x[:, :3])),
+}
+
+
+def _recognizes(name: str, head: bytes) -> bool:
+    return bool(_DIMENSIONS.search(decode_head(head)))
+
+
+def _read(source: Source, options: ReadOptions) -> Samples | DirectionalSamples:
+    path = source.path
+    options.refuse(path, "ALTA's header names its columns")
+    tags = dict(_TAG.findall("\n".join(decode_head(source.head).splitlines())))
+    inputs, outputs = _dimensions(path, tags.get("DIM", ""))
+    parametrization = tags.get("PARAM_IN", "").upper()
+    _check_parametrization(path, parametrization, inputs)
+    numbers = _numbers(source, tags, inputs, outputs)
+    x, values = numbers[:, :inputs], numbers[:, inputs : inputs + outputs]
+    names = ("R", "G", "B") if outputs == 3 else tuple(str(n + 1) for n in range(outputs))
+    kind = tags.get("PARAM_OUT", "UNKNOWN_OUTPUT").upper()
+    notes: tuple[str, ...] = ()
+    if kind not in (*_PLAIN, _WEIGHTED):
+        notes = (f"{kind} is read as values of f_r",)
+    if parametrization in _ONE_ANGLE:
+        unit = _ONE_ANGLE[parametrization]
+        return samples(path, x[:, 0], unit, values, names, "brdf", notes)
+    whole = np.isfinite(numbers).all(axis=1, keepdims=True)
+    x, values = np.where(whole, x, 0.0), np.where(whole, values, np.nan)
+    with np.errstate(all="ignore"):
+        light, view = _TWO_DIRECTIONS[parametrization][1](x)
+        if kind == _WEIGHTED:
+            values = values / np.where(view[:, 2:] > 0, view[:, 2:], np.nan)
+            notes += ("the values hold the cosine of the view, by which they are divided",)
+        angles = (polar_angle(light), azimuth(light), polar_angle(view), azimuth(view))
+    return directional_samples(path, *angles, values, names, notes)
+
+
+def _dimensions(path: Path, text: str) -> tuple[int, int]:
+    words = text.split()
+    if len(words) < 2 or not all(re.fullmatch("[0-9]{1,3}", word) for word in words[:2]):
+        raise MdfconvError(f"{path}: ALTA data of dimension '{text}'", "two whole numbers go there")
+    return int(words[0]), int(words[1])
+
+
+def _check_parametrization(path: Path, parametrization: str, inputs: int) -> None:
+    known = dict.fromkeys(_ONE_ANGLE, 1) | {
+        name: size for name, (size, _) in _TWO_DIRECTIONS.items()
+    }
+    if parametrization not in known:
+        raise MdfconvError(
+            f"{path}: ALTA input parametrization '{parametrization}'", f"known: {', '.join(known)}"
+        )
+    if inputs != known[parametrization]:
+        raise MdfconvError(
+            f"{path}: ALTA data of {inputs} inputs, where {parametrization} has "
+            f"{known[parametrization]}"
+        )
+
+
+def _numbers(source: Source, tags: dict[str, str], inputs: int, outputs: int) -> Array:
+    """Return the rows of the file, the inputs first."""
+    if tags.get("FORMAT", "text").lower() == "binary":
+        return _binary(source, tags, inputs + outputs)
+    numbers = parse_table(source.path, decode(source).splitlines()).numbers
+    if not 1 <= outputs <= numbers.shape[1] - inputs:
+        raise MdfconvError(
+            f"{source.path}: {numbers.shape[1]} columns do not hold {inputs} + {outputs} dimensions"
+        )
+    return numbers
+
+
+def _binary(source: Source, tags: dict[str, str], width: int) -> Array:
+    path, content = source.path, source.content
+    if tags.get("PRECISION", "") != "ieee754-double" or tags.get("VERSION", "") != "0":
+        raise MdfconvError(f"{path}: ALTA binary data", "only version 0 of ieee754-double is read")
+    count = tags.get("SAMPLE_COUNT", "")
+    if not re.fullmatch("[0-9]{1,12}", count):
+        raise MdfconvError(f"{path}: ALTA binary data without a count of samples")
+    order = ">" if tags.get("ENDIAN", "little").lower() == "big" else "<"
+    start = content.find(b"\n", content.find(_BEGIN)) + 1 if _BEGIN in source.head else 0
+    size = int(count) * width
+    if not start or len(content) - start < 8 * size:
+        raise MdfconvError(
+            f"{path}: truncated: {len(content) - start} bytes where {count} samples take {8 * size}"
+        )
+    if not size:
+        raise MdfconvError(f"{path}: no samples")
+    return np.frombuffer(content, f"{order}f8", size, start).astype(float).reshape(-1, width)
+
+
+READER = Reader("ALTA", _recognizes, _read)

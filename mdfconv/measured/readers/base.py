@@ -1,0 +1,153 @@
+"""What a reader of measurements is, what it is given, and what its user may choose."""
+
+from __future__ import annotations
+
+import mmap
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mdfconv.errors import MdfconvError
+from mdfconv.measured.directional import DirectionalSamples
+from mdfconv.measured.samples import Samples
+from mdfconv.output.files import STANDARD_INPUT
+
+# Laboratories write pages of comments before the words that a format is known by.
+_HEAD_BYTES = 65536
+_BYTE_ORDER_MARKS = {
+    b"\xef\xbb\xbf": "utf-8-sig",
+    b"\xff\xfe": "utf-16",
+    b"\xfe\xff": "utf-16",
+}
+
+# They are quoted in messages, which are one line and say nothing to a terminal.
+_CONTROLS = dict.fromkeys(
+    {*range(32), *range(127, 160), 0x2028, 0x2029} - {ord("\t"), ord("\n"), ord("\r"), ord("\f")},
+    "\ufffd",
+)
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What the user says about a file; columns of a table by name or by number from 1.
+
+    Parameters
+    ----------
+    angle : str or None
+        The column of angles of a table of one angle; None to find it.
+    theta_i, phi_i, theta_o, phi_o : str or None
+        The columns of zenith and azimuth of the incident and the outgoing direction; None to
+        find them by their names.
+    values : tuple of str
+        The columns of values; empty for all that are none of angles.
+    unit : str or None
+        ``"degrees"``, ``"radians"`` or ``"cosine"``; None to find it.
+    angle_is : str or None
+        Of a table of one angle: ``"half"``, the angle between normal and half vector, which is
+        what None takes it for; ``"reflected"`` or ``"incident"``, the zenith of that direction.
+    cells : int or None
+        Of a MERL file: how many cells of the whole are taken; None for the slice θ_d ≈ 0.
+    """
+
+    angle: str | None = None
+    theta_i: str | None = None
+    phi_i: str | None = None
+    theta_o: str | None = None
+    phi_o: str | None = None
+    values: tuple[str, ...] = ()
+    unit: str | None = None
+    angle_is: str | None = None
+    cells: int | None = None
+
+    def refuse(self, path: Path, reason: str) -> None:
+        """Raise if anything is chosen for a file that leaves no choice."""
+        if replace(self, cells=None) != ReadOptions():
+            raise MdfconvError(f"{path}: {reason}", "choose no columns and no unit")
+
+
+@dataclass(frozen=True)
+class Source:
+    """The bytes of a file or of standard input.
+
+    Parameters
+    ----------
+    path : Path
+        The file; for standard input what messages call it.
+    content : bytes or mmap.mmap
+        Its bytes. A slice of either is bytes.
+    """
+
+    path: Path
+    content: bytes | mmap.mmap
+
+    @property
+    def head(self) -> bytes:
+        """The first bytes, by which a reader knows its format."""
+        return self.content[:_HEAD_BYTES]
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A format.
+
+    Parameters
+    ----------
+    name : str
+        What the format is called.
+    recognizes : callable
+        Of the file's name and its first bytes: whether the file is of this format.
+    read : callable
+        Of a `Source` and `ReadOptions`: the samples. Raises `MdfconvError`.
+    """
+
+    name: str
+    recognizes: Callable[[str, bytes], bool]
+    read: Callable[[Source, ReadOptions], Samples | DirectionalSamples]
+
+
+def open_source(path: Path | str) -> Source:
+    """Return the content of a file, or of standard input for ``"-"``.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    """
+    if str(path) == STANDARD_INPUT:
+        return Source(Path("standard input"), sys.stdin.buffer.read() if sys.stdin else b"")
+    path = Path(path)
+    with path.open("rb") as file:
+        try:
+            return Source(path, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+        except (ValueError, OSError):  # empty, or a pipe
+            return Source(path, file.read())
+
+
+def decode(source: Source) -> str:
+    """Return the text of a source: UTF-8, or what its byte order mark says; no control characters.
+
+    Raises
+    ------
+    MdfconvError
+        If it is not text.
+    """
+    content = source.content[:]
+    encoding = _encoding(content)
+    try:
+        return content.decode(encoding).translate(_CONTROLS)
+    except UnicodeDecodeError as error:
+        name = "UTF-16" if encoding == "utf-16" else "UTF-8"
+        raise MdfconvError(
+            f"{source.path}: not {name} text (byte {error.start + 1})", "convert its encoding first"
+        ) from None
+
+
+def decode_head(head: bytes) -> str:
+    """Return the beginning of a file as text, with replacements for what is none."""
+    return head.decode(_encoding(head), errors="replace").translate(_CONTROLS)
+
+
+def _encoding(content: bytes) -> str:
+    marks = (name for mark, name in _BYTE_ORDER_MARKS.items() if content.startswith(mark))
+    return next(marks, "utf-8")

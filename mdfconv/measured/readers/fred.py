@@ -1,0 +1,79 @@
+"""FRED's tabulated BSDF: lines ``θ φ`` of an incidence, each followed by rows ``θ φ value``.
+
+The azimuth of incidence is that of the light's travel: the specular direction has the same one.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from mdfconv.errors import MdfconvError
+from mdfconv.measured.directional import DirectionalSamples, directional_samples
+from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, decode_head
+
+_KNOWN_BY = re.compile(r"^\s*type\s+bsdf_data\b", re.M | re.I)
+_SETTING = re.compile(r"(\w+)\s*=\s*(\S+)")
+_COMMENTS = ("!", "#", "//")
+
+
+def _recognizes(name: str, head: bytes) -> bool:
+    return bool(_KNOWN_BY.search(decode_head(head)))
+
+
+def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
+    path = source.path
+    options.refuse(path, "the header of FRED's format says what its numbers are")
+    scale, to_radians = 1.0, np.pi / 180
+    incidence: list[float] = []
+    rows: list[list[float]] = []
+    for number, line in enumerate(decode(source).splitlines(), start=1):
+        words = line.split()
+        if not words or line.lstrip().startswith(_COMMENTS) or words[0].lower() == "type":
+            continue
+        if words[0].lower() == "format":
+            scale, to_radians = _format(path, number, line)
+            continue
+        numbers = _numbers(path, number, line)
+        if len(numbers) == 2:
+            incidence = numbers
+        elif len(numbers) == 3 and incidence:
+            rows.append([*incidence, *numbers])
+        else:
+            raise MdfconvError(
+                f"{path}, line {number}: {len(numbers)} numbers"
+                + ("" if incidence else " before an incidence"),
+                "two are an incidence (θ φ), three a row (θ φ value)",
+            )
+    if not rows:
+        raise MdfconvError(f"{path}: no rows θ φ value")
+    table = np.array(rows)
+    theta_i, phi_i, theta_o, phi_o = table[:, :4].T * to_radians
+    with np.errstate(over="ignore"):
+        values = table[:, 4:] * scale
+    return directional_samples(path, theta_i, phi_i + np.pi, theta_o, phi_o, values, ("value",))
+
+
+def _format(path: Path, number: int, line: str) -> tuple[float, float]:
+    """Return the scale of the values and the factor to radians that a line of settings gives."""
+    settings = {key.lower(): value for key, value in _SETTING.findall(line)}
+    angles = settings.get("angles", "deg").lower()
+    if angles not in ("deg", "rad") or settings.get("bsdf", "value").lower() != "value":
+        raise MdfconvError(
+            f"{path}, line {number}: {line.strip()[:60]}",
+            "angles=deg or angles=rad, and bsdf=value are read",
+        )
+    (scale,) = _numbers(path, number, settings.get("scale", "1"))
+    return scale, np.pi / 180 if angles == "deg" else 1.0
+
+
+def _numbers(path: Path, number: int, line: str) -> list[float]:
+    try:
+        return [float(word) for word in line.replace(",", " ").split()]
+    except ValueError:
+        raise MdfconvError(f"{path}, line {number}: not numbers: {line.strip()[:60]}") from None
+
+
+READER = Reader("FRED", _recognizes, _read)

@@ -1,0 +1,111 @@
+"""The RGL material database's tensor files (Dupuy & Jakob 2018): the distribution of normals.
+
+Such a file holds, next to the reflectance, D as it was measured from retroreflection, on a grid
+of u_θ, u_φ ∈ [0, 1] with θ = u_θ² π/2 and φ = (2 u_φ - 1) π (functions ``u2theta`` and ``u2phi``
+of the authors' loader), φ along the first axis.
+"""
+
+from __future__ import annotations
+
+import math
+import mmap
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+from mdfconv.measured.readers.base import Reader, ReadOptions, Source
+from mdfconv.measured.samples import Samples, samples
+
+_SIGNATURE = b"tensor_file\0"
+_VERSION = (1, 0)
+# By the number that stands for a type in the file.
+_TYPES = (None, "u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f4", "<f8")
+_MOST_DIMENSIONS = 8
+
+
+def _recognizes(name: str, head: bytes) -> bool:
+    return head.startswith(_SIGNATURE)
+
+
+def _read(source: Source, options: ReadOptions) -> Samples:
+    options.refuse(source.path, "a tensor file has no columns")
+    wanted = _fields(source)
+    density = wanted.get("ndf")
+    if density is None or density.ndim != 2 or min(density.shape) < 1 or density.shape[1] < 2:
+        raise MdfconvError(
+            f"{source.path}: no table 'ndf', the distribution of normals, with two axes",
+            f"there are {', '.join(wanted) or 'none'}",
+        )
+    theta = (np.arange(density.shape[1]) / (density.shape[1] - 1)) ** 2 * (np.pi / 2)
+    values = _around(density.astype(float))
+    notes = ["the measured distribution of normals is read, not the reflectance"]
+    azimuths = wanted.get("phi_i")
+    if azimuths is not None and azimuths.size > 2:
+        notes.append("the surface is anisotropic: averaged over azimuth")
+    return samples(source.path, theta, "radians", values[:, None], ("ndf",), "ndf", tuple(notes))
+
+
+def _around(density: Array) -> Array:
+    """Return the mean over azimuth, whose first and last row are one direction."""
+    if len(density) == 1:
+        return density[0]
+    weight = np.ones(len(density))
+    weight[[0, -1]] = 0.5
+    with np.errstate(all="ignore"):
+        return weight @ density / weight.sum()
+
+
+def _fields(source: Source) -> dict[str, Array]:
+    """Return the tables of a tensor file by name.
+
+    Raises
+    ------
+    MdfconvError
+        If the file is truncated or of another version.
+    """
+    path, content = source.path, source.content
+    position = len(_SIGNATURE)
+    (*version, count), position = _unpack(path, content, "<BBI", position)
+    if tuple(version) != _VERSION:
+        raise MdfconvError(
+            f"{path}: tensor file of version {version[0]}.{version[1]}", "only 1.0 is read"
+        )
+    fields = {}
+    for _ in range(count):
+        (length,), position = _unpack(path, content, "<H", position)
+        name = content[position : position + length].decode("ascii", errors="backslashreplace")
+        name = name if name.isprintable() else repr(name)
+        (dimensions, kind, offset), position = _unpack(path, content, "<HBQ", position + length)
+        if dimensions > _MOST_DIMENSIONS:
+            raise MdfconvError(f"{path}: damaged: table '{name}' has {dimensions} axes")
+        shape, position = _unpack(path, content, f"<{dimensions}Q", position)
+        fields[name] = _table(source, name, shape, kind, offset)
+    return fields
+
+
+def _table(source: Source, name: str, shape: tuple[int, ...], kind: int, offset: int) -> Array:
+    form = _TYPES[kind] if kind < len(_TYPES) else None
+    if form is None:
+        raise MdfconvError(f"{source.path}: damaged: table '{name}' is of unknown type {kind}")
+    count = math.prod(shape)
+    if offset + count * np.dtype(form).itemsize > len(source.content):
+        raise MdfconvError(f"{source.path}: truncated: table '{name}' goes beyond its end")
+    if not count:
+        return np.zeros(0)
+    return np.frombuffer(source.content, form, count, offset).reshape(shape)
+
+
+def _unpack(
+    path: Path, content: bytes | mmap.mmap, form: str, position: int
+) -> tuple[tuple[int, ...], int]:
+    size = struct.calcsize(form)
+    part = content[position : position + size]
+    if len(part) < size:
+        raise MdfconvError(f"{path}: truncated within its table of contents")
+    return struct.unpack(form, part), position + size
+
+
+READER = Reader("RGL", _recognizes, _read)

@@ -1,0 +1,132 @@
+"""Zemax's tabular BSDF, Radiant Imaging's BSDF Data Interchange format.
+
+The scatter angles are polar coordinates about the specular direction: the radial angle from it,
+and the azimuth about it, 0 towards the normal of the surface and counter-clockwise from there
+("BSDF Data Interchange file format specification", Zemax knowledge base).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mdfconv.brdf.directions import azimuth as azimuths
+from mdfconv.brdf.directions import direction, polar_angle
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+from mdfconv.measured.directional import DirectionalSamples, directional_samples
+from mdfconv.measured.readers.angles import turn_from_normal
+from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, decode_head
+from mdfconv.measured.readers.words import Words
+
+_KNOWN_BY = re.compile(r"^\s*AngleOfIncidence\s", re.M | re.I)
+_WORDS = ("source", "symmetry", "spectralcontent", "scattertype")
+_ANGLES = ("samplerotation", "angleofincidence", "scatterazimuth", "scatterradial")
+_CHANNELS = {"monochrome": "value", "tristimulusx": "X", "tristimulusy": "Y", "tristimulusz": "Z"}
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """The angles of a file, radians."""
+
+    rotation: Array
+    incidence: Array
+    azimuth: Array
+    radial: Array
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the values of one channel."""
+        return self.rotation.size, self.incidence.size, self.azimuth.size, self.radial.size
+
+
+def _recognizes(name: str, head: bytes) -> bool:
+    return bool(_KNOWN_BY.search(decode_head(head)))
+
+
+def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
+    path = source.path
+    options.refuse(path, "the header of Zemax's format says what its numbers are")
+    lines = enumerate(decode(source).splitlines(), start=1)
+    words = Words(path, [(number, line) for number, line in lines if not _is_comment(line)])
+    grid = _header(path, words)
+    channels, tables = [], []
+    while (word := words.peek()) is not None and word.lower() in _CHANNELS:
+        channels.append(_CHANNELS[words.next("data").lower()])
+        tables.append(_channel(words, grid))
+    if not tables or words.peek() is not None:
+        raise words.error(f"no data, or something else than data: {str(words.peek())[:30]}")
+    return _samples(path, grid, np.stack(tables, axis=-1), channels)
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip().startswith("#")
+
+
+def _header(path: Path, words: Words) -> _Grid:
+    """Return the angles, and move on to the data."""
+    angles: dict[str, Array] = {}
+    while (key := (words.peek() or "").lower()) not in _CHANNELS:
+        words.next("the data")
+        if key in _ANGLES:
+            angles[key] = np.radians(words.numbers(words.count(key), key))
+        elif key in _WORDS:
+            value = words.next(key)
+            if key == "scattertype" and value.upper() != "BRDF":
+                raise words.error(f"ScatterType {value[:30]}: only BRDF, reflection, is read")
+        else:
+            raise words.error(f"'{key[:30]}' is no word of Zemax's header")
+    missing = [key for key in _ANGLES[1:] if key not in angles]
+    if missing:
+        raise MdfconvError(f"{path}: the header lacks {', '.join(missing)}")
+    if not all(np.isfinite(values).all() for values in angles.values()):
+        raise MdfconvError(f"{path}: an angle of the header is not finite")
+    return _Grid(angles.get(_ANGLES[0], np.zeros(1)), *(angles[key] for key in _ANGLES[1:]))
+
+
+def _channel(words: Words, grid: _Grid) -> Array:
+    """Return the values of one channel, shape `_Grid.shape`."""
+    words.expect("DataBegin")
+    blocks = []
+    for _ in range(grid.rotation.size * grid.incidence.size):
+        words.expect("TIS")
+        words.numbers(1, "TIS")
+        blocks.append(words.numbers(grid.azimuth.size * grid.radial.size, "the values"))
+    words.expect("DataEnd")
+    return np.concatenate(blocks).reshape(grid.shape)
+
+
+def _samples(path: Path, grid: _Grid, values: Array, channels: Sequence[str]) -> DirectionalSamples:
+    # At the specular direction all azimuths are one sample.
+    wanted = np.ones(grid.shape, bool)
+    wanted[:, :, 1:, np.abs(grid.radial) < 1e-9] = False
+    measured = (values != 0).any(axis=-1)
+    empty = int(np.count_nonzero(wanted & ~measured))
+    notes = (f"{empty} values of 0 are places without a measurement and left out",) if empty else ()
+    rotation, incidence, azimuth, radial = (
+        angle[wanted & measured]
+        for angle in np.meshgrid(
+            grid.rotation, grid.incidence, grid.azimuth, grid.radial, indexing="ij"
+        )
+    )
+    # About the specular direction at azimuth 0, where x points away from the normal.
+    about = direction(radial, np.pi + azimuth)
+    outgoing = turn_from_normal(about, incidence, rotation)
+    theta, phi = polar_angle(outgoing), azimuths(outgoing)
+    return directional_samples(
+        path,
+        incidence,
+        np.pi + rotation,
+        theta,
+        phi,
+        values[wanted & measured],
+        tuple(channels),
+        notes,
+    )
+
+
+READER = Reader("Zemax", _recognizes, _read)

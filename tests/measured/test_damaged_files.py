@@ -1,0 +1,117 @@
+"""Files of arbitrary bytes, and damaged ones of every format: an error, or samples that hold."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from mdfconv.errors import MdfconvError
+from mdfconv.measured.directional import DirectionalSamples
+from mdfconv.measured.readers import ReadOptions, read
+from mdfconv.measured.readers.merl import read_merl_directional
+from tests.measured.scans import grid, measured, merl_bytes, rows, tensor_bytes
+from tests.measured.test_readers import alta, fred, zemax
+
+ANGLES = grid((30, 60), range(0, 80, 20), range(0, 360, 90))
+VALUES = measured(ANGLES)[2]
+TABLE = rows(ANGLES, VALUES, digits=".4g")
+FILES = {
+    "table": f"theta_i,phi_i,theta_o,phi_o,brdf\n{TABLE}".encode(),
+    "comment": f"# phi_i theta_i phi_o theta_o brdf\n{TABLE}".replace(",", " ").encode(),
+    "utf-16": f"θi;φi;θo;φo;f_r\n{TABLE}".replace(",", ";").replace(".", ",").encode("utf-16"),
+    "one angle": b"# theta_i = 30 deg\nn,theta,R\n" + rows(range(9), range(9), range(9)).encode(),
+    "astm": f"NUM_POINTS 32\nVARS theta_i,phi_i,theta_s,phi_s,Red\n{TABLE}".encode(),
+    "zemax": zemax().encode(),
+    "fred": fred().encode(),
+    "alta": alta("ISOTROPIC_TL_TV_PROJ_DPHI", np.radians(ANGLES[:, [0, 2, 3]]), VALUES),
+    "alta binary": alta("SPHERICAL_TL_PL_TV_PV", np.radians(ANGLES), VALUES, binary="little"),
+    "alta vectors": alta("CARTESIAN", np.ones((9, 6)), np.arange(9.0), "X", binary="big"),
+    "merl": merl_bytes((3, 2, 2)),
+    "rgl": tensor_bytes({"phi_i": np.zeros(1, "<f4"), "ndf": np.ones((3, 4), "<f4")}),
+}
+SETTINGS = settings(
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+# What parsers stumble over.
+PIECES = st.sampled_from(
+    [b"nan", b"inf", b"-1e308", b"1e309", b"\0", b"\xff", b'"', b",", b"\n", b"#", b"-", b"9" * 30]
+)
+
+
+def check_message(message):
+    assert message
+    assert len(message.splitlines()) == 1
+
+
+def check(path, options=None):
+    """Read a file; whatever comes back has to be what it promises to be."""
+    try:
+        samples = read(path, options)
+    except MdfconvError as error:
+        check_message(str(error))
+        return
+    assert np.isfinite(samples.values).all()
+    assert samples.values.shape[1] == len(samples.channels)
+    if isinstance(samples, DirectionalSamples):
+        for vectors in (samples.incident, samples.outgoing):
+            np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1, atol=1e-9)
+            assert (vectors[:, 2] > 0).all()
+    else:
+        assert ((samples.beta >= 0) & (samples.beta <= np.pi / 2)).all()
+
+
+@SETTINGS
+@given(content=st.binary(max_size=300), name=st.sampled_from(["a.txt", "a.bsdf", "a.binary"]))
+def test_arbitrary_bytes(tmp_path, content, name):
+    path = tmp_path / name
+    path.write_bytes(content)
+    check(path)
+
+
+@SETTINGS
+@given(text=st.text(alphabet="0123456789.,;-+eE \t\n#%\"'abθφ_", max_size=120))
+def test_arbitrary_tables(tmp_path, text):
+    path = tmp_path / "a.txt"
+    path.write_text(text, encoding="utf-8")
+    check(path)
+    check(path, ReadOptions(theta_i="1", theta_o="2", values=("3",)))
+    check(path, ReadOptions(angle="1", unit="cosine", angle_is="reflected"))
+
+
+@pytest.mark.parametrize("form", FILES)
+def test_whole_files_are_read(tmp_path, form):
+    path = tmp_path / "a.txt"
+    path.write_bytes(FILES[form])
+    if form != "one angle":
+        assert len(read(path).values) > 1 or form == "merl"
+    check(path)
+
+
+@pytest.mark.parametrize("form", FILES)
+@SETTINGS
+@given(data=st.data())
+def test_damaged(tmp_path, form, data):
+    content = FILES[form]
+    place = data.draw(st.integers(0, len(content)))
+    end = data.draw(st.integers(place, min(len(content), place + 40)))
+    damage = data.draw(st.one_of(st.none(), st.binary(max_size=8), PIECES))
+    path = tmp_path / "a.txt"
+    path.write_bytes(
+        content[:place] if damage is None else content[:place] + damage + content[end:]
+    )
+    check(path)
+
+
+@SETTINGS
+@given(place=st.integers(0, 43), byte=st.integers(0, 255))
+def test_damaged_merl_as_a_whole(tmp_path, place, byte):
+    content = bytearray(FILES["merl"])
+    content[place] = byte
+    path = tmp_path / "a.binary"
+    path.write_bytes(content)
+    try:
+        samples = read_merl_directional(path, count=10)
+    except MdfconvError as error:
+        check_message(str(error))
+        return
+    assert np.isfinite(samples.values).all()

@@ -1,0 +1,158 @@
+"""`mdfconv fit` on files of two directions: tables, reports, pictures, several files."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.cli.runner import run
+from tests.measured.test_brdf_fit import measured
+
+HEADER = "theta_i,phi_i,theta_o,phi_o,R,G\n"
+
+
+def degrees(vectors):
+    theta = np.degrees(np.arctan2(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2]))
+    return theta, np.degrees(np.arctan2(vectors[:, 1], vectors[:, 0]))
+
+
+def write(path, name="ggx", seed=1, **rest):
+    data = measured(
+        np.random.default_rng(seed), name, diffuse=(0.3, 0.1), specular=(0.8, 0.5), **rest
+    )
+    columns = (*degrees(data.incident), *degrees(data.outgoing), *data.values.T)
+    lines = [",".join(f"{cell:.9g}" for cell in row) for row in zip(*columns, strict=True)]
+    path.write_text(HEADER + "\n".join(lines) + "\n")
+    return path
+
+
+def test_table(tmp_path):
+    path = write(tmp_path / "paint.csv")
+    status, out, err = run("fit", path, "--loss", "log", "--format", "json")
+    assert status == 0
+    records = {record["distribution"]: record for record in json.loads(out)}
+    ggx = records["ggx"]
+    assert abs(ggx["parameter"] - 0.2) < 4 * ggx["stderr"]
+    assert ggx["diffuse"] == pytest.approx([0.3, 0.1], rel=0.02)
+    assert ggx["specular"] == pytest.approx([0.8, 0.5], rel=0.02)
+    assert ggx["masking"] == "smith"
+    assert records["beckmann"]["error"] > 3 * ggx["error"]
+    assert "best is ggx" in err or "best is smoothie" in err
+    assert "degrees" in err
+
+
+def test_reflectance_and_masking(tmp_path):
+    path = write(tmp_path / "paint.csv", reflectance=0.3)
+    words = "--to", "ggx", "--loss", "log", "--fresnel", "fit", "--format", "json"
+    (record,) = json.loads(run("fit", path, *words)[1])
+    assert abs(record["reflectance"] - 0.3) < 4 * record["reflectance_stderr"]
+    (other,) = json.loads(run("fit", path, *words, "--masking", "none")[1])
+    assert other["masking"] == "none"
+    assert other["error"] > record["error"]
+
+
+class Page(HTMLParser):
+    """What a page asks for from elsewhere, and its text."""
+
+    def __init__(self):
+        super().__init__()
+        self.sources, self.words = [], []
+
+    def handle_starttag(self, tag, attributes):
+        self.sources += [value for name, value in attributes if name in ("src", "href")]
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+def test_report(tmp_path):
+    path = write(tmp_path / "<script>paint.csv")
+    status, _, _ = run("fit", path, "--to", "ggx", "--to", "beckmann", "--report", "paint.html",
+                       cwd=tmp_path)  # fmt: skip
+    assert status == 0
+    text = (tmp_path / "paint.html").read_text()
+    page = Page()
+    page.feed(text)
+    # One file: nothing from elsewhere, no name taken for a tag.
+    assert all(source.startswith("data:image/png;base64,") for source in page.sources)
+    assert len(page.sources) == 2
+    assert "<script" not in text
+    words = " ".join(page.words)
+    for part in ("<script>paint.csv", "angles of incidence", "ggx",
+                 "roughnessFactor", "Pr ", "roughconductor", "--report paint.html"):  # fmt: skip
+        assert part in words
+    alpha = float(re.search(r'name="alpha" value="([^"]+)"', words)[1])
+    assert alpha == pytest.approx(0.2, rel=0.01)
+    roughness = float(re.search(r"roughnessFactor\": (\S+)", words)[1])
+    assert roughness == pytest.approx(alpha**0.5, rel=1e-5)
+
+
+def size(path):
+    with Image.open(path) as picture:
+        return picture.size
+
+
+def test_markdown_report_and_pictures(tmp_path):
+    path = write(tmp_path / "paint.csv")
+    words = "--to", "ggx", "--report", "paint.md", "--png", "all.png"
+    assert run("fit", path, *words, cwd=tmp_path)[0] == 0
+    text = (tmp_path / "paint.md").read_text()
+    for name in re.findall(r"!\[.*?\]\((.*?)\)", text):
+        assert size(tmp_path / name)[0] > 500
+    assert {"paint-channel-R.png", "paint-channel-G.png"} <= {
+        path.name for path in tmp_path.iterdir()
+    }
+    # A row for each channel.
+    one, both = (size(tmp_path / name) for name in ("paint-channel-R.png", "all.png"))
+    assert both[1] > 1.5 * one[1]
+
+
+def test_several_files_make_one_table(tmp_path):
+    write(tmp_path / "a.csv", "ggx")
+    write(tmp_path / "b.csv", "beckmann")
+    status, out, err = run(
+        "fit", "*.csv", "--to", "ggx", "--to", "beckmann", "--loss", "log", "--format", "json",
+        cwd=tmp_path,
+    )  # fmt: skip
+    assert status == 0
+    best = {}
+    for record in json.loads(out):
+        best.setdefault(record["file"], record["distribution"])
+    assert best == {"a.csv": "ggx", "b.csv": "beckmann"}
+    assert "a.csv: best is ggx" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["a.csv", "b.csv", "--png", "x.png"], "--png and --report are of one file"),
+        (["a.csv", "--report", "x.pdf"], "a report is an .html or a .md file"),
+        (["a.csv", "--fresnel", "much"], "unknown Fresnel factor 'much'"),
+        (["a.csv", "--max-angle", "4"], "no samples up to 4°"),
+        (["a.csv", "--cells", "100"], "cells are those of a MERL file"),
+        (["a.csv", "--theta-i", "nowhere"], "nowhere"),
+        (["one.csv", "--fresnel", "fit"], "need two directions"),
+        (["one.csv", "--loss", "cosine"], "need two directions"),
+        (["none.csv"], "cannot read none.csv"),
+    ],
+)
+def test_mistakes(tmp_path, words, message):
+    write(tmp_path / "a.csv")
+    write(tmp_path / "b.csv")
+    (tmp_path / "one.csv").write_text("angle deg,value\n0,1\n5,0.9\n10,0.6\n20,0.2\n30,0.1\n")
+    before = sorted(tmp_path.iterdir())
+    status, out, err = run("fit", *words, cwd=tmp_path)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert len(err.splitlines()) == 1
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_standard_input(tmp_path):
+    content = write(tmp_path / "a.csv").read_bytes()
+    status, out, _ = run("fit", "-", "--to", "ggx", "--format", "plain", stdin=content)
+    assert status == 0
+    assert "ggx" in out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import cycle
+from itertools import cycle, pairwise, zip_longest
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from mdfconv.benchmark.measure import Measurements
 from mdfconv.benchmark.pareto import front
 from mdfconv.benchmark.timing import NOISE, Spread
+from mdfconv.distributions.evaluation import Array
 from mdfconv.output.figures import encoded, line_style, new_figure
 from mdfconv.output.labels import place_labels
 
@@ -120,8 +121,9 @@ class _Panel:
         self._zero = _BELOW * min(errors, default=1.0)
         shapes = list(colors)
         variants = list(dict.fromkeys(point.variant for point in self._points))
+        self._fronts = [self._front(variant) for variant in variants]
         for fill, variant in enumerate(variants):
-            self._draw_front(variant, _FRONTS[fill % len(_FRONTS)])
+            self._axes.plot(*self._fronts[fill].T, zorder=1, **_front_style(fill))
             for point in self._points:
                 if point.variant == variant:
                     style = _style(shapes.index(point.name), fill, colors[point.name])
@@ -132,7 +134,7 @@ class _Panel:
     def label(self) -> None:
         """Write the names beside the points of a figure whose layout is final."""
         x, y = zip(*map(self._position, self._points), strict=True)
-        place_labels(self._axes, x, y, [point.name for point in self._points])
+        place_labels(self._axes, x, y, [point.name for point in self._points], self._fronts)
 
     def _position(self, point: _Point) -> tuple[float, float]:
         return point.nanoseconds.median, max(point.error, self._zero)
@@ -142,24 +144,31 @@ class _Panel:
         bars = [[times.median - times.low], [times.high - times.median]]
         self._axes.errorbar(*self._position(point), xerr=bars, elinewidth=0.8, **style)
 
-    def _draw_front(self, variant: str, dashes: str) -> None:
+    def _front(self, variant: str) -> Array:
+        """Return the corners of the front of a variant: what is at least as quick has its error."""
         positions = [self._position(point) for point in self._points if point.variant == variant]
-        x, y = zip(*(positions[number] for number in front(positions, NOISE)), strict=True)
-        self._axes.step(x, y, where="post", color="0.55", linewidth=1.2, linestyle=dashes, zorder=1)
+        best = [positions[number] for number in front(positions, NOISE)]
+        corners = [(later[0], earlier[1]) for earlier, later in pairwise(best)]
+        steps = [point for pair in zip_longest(best, corners) for point in pair if point]
+        return np.array(steps)
 
     def _draw_legend(self, variants: Sequence[str]) -> None:
         plot = self._axes.plot
-        fills = [plot([], [], **_style(0, fill, "0.4"))[0] for fill in range(len(variants))]
-        line = plot([], [], color="0.55", linewidth=1.2)
+        handles = [
+            plot([], [], **_style(0, fill, "0.4") | _front_style(fill))[0]
+            for fill in range(len(variants))
+        ]
         self._axes.legend(
-            [*fills, *line],
-            [*variants, "Pareto front"],
+            handles,
+            variants,
+            title="lines: Pareto fronts",
+            title_fontsize=8,
             loc="upper center",
             bbox_to_anchor=(0.5, -0.12),
-            ncols=4,
+            ncols=2,
             fontsize=8,
-            columnspacing=1.2,
-            handletextpad=0.4,
+            columnspacing=1.5,
+            handlelength=4,
         )
 
     def _scale(self) -> None:
@@ -187,6 +196,10 @@ class _Panel:
         axes.set_ylim(zero / 3, top)
         axes.set_yticks([tick for tick in axes.get_yticks() if 2 * zero < tick < top])
         axes.yaxis.set_minor_locator(NullLocator())
+
+
+def _front_style(fill: int) -> dict[str, Any]:
+    return {"linestyle": _FRONTS[fill % len(_FRONTS)], "linewidth": 1.2, "color": "0.55"}
 
 
 def _style(shape: int, fill: int, color: str) -> dict[str, Any]:

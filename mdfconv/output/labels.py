@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -14,6 +15,8 @@ _FONT = 7.5
 _LETTER = 0.66 * _FONT
 _MARKER = 5.0
 _TOGETHER = 8.0
+# A line is seen at so many places of its own, each as bad as so much of another label.
+_LINE_STEP, _LINE_COST = 2.0, 20.0
 # Where a label may stand: from the marker to the middle of its nearer end, in order of choice.
 _PLACES = [
     (side * (_MARKER + 2) if side else 0.0, height, side)
@@ -27,8 +30,14 @@ _PLACES = [
 _Box: TypeAlias = tuple[float, float, float, float]
 
 
-def place_labels(axes: Any, x: Sequence[float], y: Sequence[float], names: Sequence[str]) -> None:
-    """Write names beside points; points that coincide share a label.
+def place_labels(
+    axes: Any,
+    x: Sequence[float],
+    y: Sequence[float],
+    names: Sequence[str],
+    lines: Sequence[Array] = (),
+) -> None:
+    """Write names beside points, off the lines; points that coincide share a label.
 
     The limits of the axes must be final, and the figure drawn once, so that its layout is.
 
@@ -40,17 +49,25 @@ def place_labels(axes: Any, x: Sequence[float], y: Sequence[float], names: Seque
         The points, in data coordinates.
     names : sequence of str
         Their names.
+    lines : sequence of numpy.ndarray, shape (n, 2)
+        Corners of lines that are drawn, in data coordinates.
     """
     from matplotlib.patheffects import withStroke
 
     scale = 72 / axes.figure.dpi
-    points = scale * axes.transData.transform(np.column_stack([x, y]))
+
+    def placed(corners: Array) -> Array:
+        return np.asarray(scale * axes.transData.transform(corners))
+
+    points = placed(np.column_stack([x, y]))
+    drawn = np.concatenate([np.empty((0, 2)), *(_along(placed(line)) for line in lines)])
     frame = scale * axes.bbox.extents
     taken = [_box(point[0], point[1], 2 * _MARKER, 2 * _MARKER) for point in points]
     for group in _groups(points):
         text = ", ".join(dict.fromkeys(names[member] for member in group))
         first = group[0]
-        costs = [_cost(_label_box(points[first], place, text), taken, frame) for place in _PLACES]
+        boxes = [_label_box(points[first], place, text) for place in _PLACES]
+        costs = [_cost(box, taken, frame) + _LINE_COST * _crossed(box, drawn) for box in boxes]
         dx, dy, side = _PLACES[int(np.argmin(costs))]
         taken.append(_label_box(points[first], (dx, dy, side), text))
         axes.annotate(
@@ -76,6 +93,20 @@ def _groups(points: Array) -> list[list[int]]:
         else:
             groups.append([place])
     return groups
+
+
+def _along(corners: Array) -> Array:
+    """Return points along a line, shape (n, 2)."""
+    parts = [corners[:1]]
+    for start, end in pairwise(corners):
+        steps = int(np.ceil(np.hypot(*(end - start)) / _LINE_STEP)) + 1
+        parts.append(np.linspace(start, end, steps))
+    return np.concatenate(parts)
+
+
+def _crossed(box: _Box, drawn: Array) -> int:
+    """Return how many points of the lines lie under a label."""
+    return int(np.count_nonzero(((drawn >= box[:2]) & (drawn <= box[2:])).all(axis=1)))
 
 
 def _label_box(point: Array, place: tuple[float, float, int], text: str) -> _Box:

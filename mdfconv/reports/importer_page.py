@@ -123,16 +123,26 @@ def _tables() -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     return ours, rules
 
 
+def _labels(curves: dict[str, Array]) -> dict[str, str]:
+    """Return the first of each group of importers that have one curve, and all their names."""
+    groups: dict[str, list[str]] = {}
+    for name in IMPORTERS:
+        same = (first for first in groups if np.allclose(curves[first], curves[name]))
+        groups.setdefault(next(same, name), []).append(name)
+    return {first: ", ".join(names) for first, names in groups.items()}
+
+
 def _draw(curves: dict[str, Array]) -> bytes:
     figure = new_figure(PAGE[0] * 1.35, PAGE[1] * 1.05)
     left, right = figure.subplots(1, 2)
     colors = colormaps["tab10"](range(10)).tolist()
+    labels = _labels(curves)
     styles = {
         name: (colors[number % len(colors)], _DASHES[number % len(_DASHES)])
-        for number, name in enumerate(IMPORTERS)
+        for number, name in enumerate(labels)
     }
     for name, (color, dashes) in (styles | _OUR_STYLES).items():
-        label = name if name in IMPORTERS else f"mdfconv, {name}"
+        label = labels.get(name, f"mdfconv, {name}")
         width = 2.0 if name == _LIGHT else 1.1
         style = {"color": color, "linestyle": dashes, "linewidth": width}
         left.plot(curves["Ns"], curves[name], label=label, **style)
@@ -148,7 +158,7 @@ def _draw(curves: dict[str, Array]) -> bytes:
         ylabel="relative RMSE under environment",
         title="Error, up to where a rule makes a mirror",
     )
-    figure.legend(loc="outside lower center", ncols=6)
+    figure.legend(loc="outside lower center", ncols=5)
     return encoded(figure, dpi=110)
 
 

@@ -30,7 +30,7 @@ def draw_histograms(report: TextureReport, title: str, dpi: int = 150) -> bytes:
         panel.stairs(shares, edges, fill=True, color=color, alpha=0.35)
         panel.stairs(shares, edges, color=color, linewidth=1)
         panel.set_ylabel("texels [%]")
-        panel.set_xlabel(name)
+        panel.set_xlabel(f"stored value, {name}")
         panel.tick_params(labelbottom=True)
     # A texture of few values has spikes; a root shows what is between them.
     panels[0].set_yscale("function", functions=(np.sqrt, np.square))

@@ -274,3 +274,21 @@ def test_labels_keep_out_of_each_others_way():
     assert [text.get_text() for text in axes.texts] == ["one, three", "two", "four"]
     boxes = [text.get_window_extent() for text in axes.texts]
     assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+
+
+def test_labels_keep_off_lines():
+    figure = new_figure(*PAGE)
+    axes = figure.subplots()
+    axes.plot([0, 4], [0, 4], "o")
+    figure.canvas.draw()
+
+    def extent(lines):
+        place_labels(axes, [2.0], [2.0], ["name"], lines)
+        figure.canvas.draw()
+        return axes.texts[-1].get_window_extent()
+
+    first = extent([])
+    middle = axes.transData.inverted().transform(first.get_points().mean(axis=0))
+    moved = extent([np.array([[0.0, middle[1]], [4.0, middle[1]]])])
+    height = first.get_points().mean(axis=0)[1]
+    assert height < moved.y0 or height > moved.y1

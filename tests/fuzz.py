@@ -1,4 +1,4 @@
-"""A seeded fuzz of the core and the command line, in one process.
+"""A seeded fuzz of the core and the command line.
 
 ``python -m tests.fuzz --cases 100000 --seed 1`` prints how often what happened, and fails if
 something was neither an answer nor a refusal: of a call an answer that its docstring allows or an
@@ -15,7 +15,9 @@ import time
 import traceback
 import warnings
 from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from tests.fuzz_api import API
@@ -25,21 +27,21 @@ from tests.fuzz_cli import CLI
 _SHARE_OF_COMMANDS = 0.15
 _LONGEST = 30  # seconds
 _SHOWN = 3
+# Of a process at a time.
+_BATCH = 500
 
 
-def fuzz(cases, seed, seconds=None, report=None):
+def fuzz(numbers, seed, end=float("inf")):
     """Run cases; return how often each class of outcome came up, and examples of failures.
 
     Parameters
     ----------
-    cases : int
-        How many; fewer if the seconds are over.
+    numbers : iterable of int
+        Those of the cases.
     seed : int
         Of the random choices: the same cases for the same one.
-    seconds : float, optional
-        When to stop.
-    report : callable, optional
-        Called with the number of cases now and then.
+    end : float, optional
+        When to stop, of `time.time`.
 
     Returns
     -------
@@ -47,13 +49,10 @@ def fuzz(cases, seed, seconds=None, report=None):
     failures : dict of str to list of str
     """
     outcomes, failures = Counter(), {}
-    end = None if seconds is None else time.monotonic() + seconds
     with _world():
-        for number in range(cases):
-            if end is not None and time.monotonic() > end:
+        for number in numbers:
+            if time.time() > end:
                 break
-            if report and number % 1000 == 0:
-                report(number)
             # A case can be had again by itself.
             choose = random.Random(f"{seed} {number}")
             kind = CLI if choose.random() < _SHARE_OF_COMMANDS else API
@@ -112,14 +111,19 @@ def main():
     parser.add_argument("--cases", type=int, default=100_000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=600)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
     chosen = parser.parse_args()
-    start = time.monotonic()
-
-    def report(number):
-        print(f"\r{number} cases, {time.monotonic() - start:.0f} s", end="", file=sys.stderr)
-
-    outcomes, failures = fuzz(chosen.cases, chosen.seed, chosen.seconds, report)
-    taken, done = time.monotonic() - start, sum(outcomes.values())
+    start, outcomes, failures = time.time(), Counter(), {}
+    first = range(0, chosen.cases, _BATCH)
+    batches = [range(number, min(number + _BATCH, chosen.cases)) for number in first]
+    with ProcessPoolExecutor(chosen.jobs) as pool:
+        run = partial(fuzz, seed=chosen.seed, end=start + chosen.seconds)
+        for some, failed in pool.map(run, batches):
+            outcomes += some
+            for outcome, examples in failed.items():
+                failures.setdefault(outcome, []).extend(examples)
+            done, taken = outcomes.total(), time.time() - start
+            print(f"\r{done} cases, {taken:.0f} s", end="", file=sys.stderr)
     print(file=sys.stderr)
     for outcome, count in sorted(outcomes.items()):
         if "FAILED" not in outcome:

@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test report bench data clean
+.PHONY: demo test report screenshot bench data clean
 demo: $(VENV)/installed
 	$(BIN)/mdfconv convert --from beckmann --to ggx 0.2 --format table
 
@@ -15,6 +15,11 @@ test: $(VENV)/installed-test
 
 report: $(VENV)/installed
 	$(BIN)/mdfconv report --output reports
+
+# The page of the report as a browser shows it.
+screenshot:
+	chromium --headless --no-sandbox --hide-scrollbars --window-size=1100,915 \
+	  --virtual-time-budget=3000 --screenshot=reports/comparison.png reports/comparison.html
 
 # Times of this machine, as reports/speed-error.*
 bench: $(VENV)/installed

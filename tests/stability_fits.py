@@ -7,6 +7,7 @@ comes from the brute-force minimizer of the tests.
 
 import functools
 import itertools
+from concurrent.futures import ProcessPoolExecutor
 
 import mpmath as mp
 import numpy as np
@@ -32,16 +33,25 @@ _GROWTH = 1.6
 
 def rows():
     """Yield a row for every pair and value: the best parameters under each metric."""
-    for source, target in PAIRS:
-        for value in EXPONENTS if source in oracles.EXPONENTS else ALPHAS:
-            single = np.float32(value)
-            results = {metric: best(metric, source, target, float(single)) for metric in METRICS}
-            yield {
-                "source": source,
-                "target": target,
-                "regime": "mirror-smooth" if value in (ALPHAS[0], EXPONENTS[0]) else "usual",
-                "value": str(single).removesuffix(".0"),
-            } | {metric: mp.nstr(result, 20) for metric, result in results.items()}
+    cases = [
+        (source, target, value)
+        for source, target in PAIRS
+        for value in (EXPONENTS if source in oracles.EXPONENTS else ALPHAS)
+    ]
+    with ProcessPoolExecutor() as pool:
+        yield from pool.map(row, *zip(*cases, strict=True))
+
+
+def row(source, target, value):
+    """Return the row of a pair and a value."""
+    single = np.float32(value)
+    results = {metric: best(metric, source, target, float(single)) for metric in METRICS}
+    return {
+        "source": source,
+        "target": target,
+        "regime": "mirror-smooth" if value in (ALPHAS[0], EXPONENTS[0]) else "usual",
+        "value": str(single).removesuffix(".0"),
+    } | {metric: mp.nstr(result, 20) for metric, result in results.items()}
 
 
 def best(metric, source, target, value):

@@ -102,9 +102,10 @@ def convert(
         np.broadcast_shapes(np.shape(x), np.shape(y))
     except ValueError:
         raise MdfconvError(f"shapes {np.shape(x)} and {np.shape(y)} are not a pair") from None
-    answers = [_convert(axis, rule, kept, *ends, threads) for axis in (x, y)]
-    warn_of(rule, zip((x, y), answers, strict=True), *ends, stacklevel=2)
-    return ends[1].pair(*answers)
+    first = _convert(x, rule, kept, *ends, threads)
+    second = _convert(y, rule, kept, *ends, threads)
+    warn_of(rule, [(x, first), (y, second)], *ends, stacklevel=2)
+    return ends[1].pair(first, second)
 
 
 def given_gamma(gamma: Gamma) -> float | None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import TypeAlias
@@ -20,6 +20,7 @@ from mdfconv.reports.artefact import Artefact
 from mdfconv.reports.fresnel_page import fresnel_page
 from mdfconv.reports.furnace_page import furnace_page
 from mdfconv.reports.importer_page import importer_page
+from mdfconv.reports.interactive_page import interactive_page
 from mdfconv.reports.lights_page import lights_page
 from mdfconv.reports.method_page import method_page
 from mdfconv.reports.stability_page import stability_page
@@ -32,6 +33,7 @@ _ARTEFACTS: tuple[_Make, ...] = (
     paper_pages.closed_forms,
     paper_pages.error_figures,
     paper_pages.pictures,
+    interactive_page,
     method_page,
     lights_page,
     importer_page,
@@ -42,8 +44,22 @@ _ARTEFACTS: tuple[_Make, ...] = (
 COUNT = len(_ARTEFACTS)
 # They are begun first, so that no process ends long after the others.
 _LONGEST = (furnace_page, stability_page, method_page)
-# Times cannot be reproduced: these are made by `mdfconv bench`, and only listed here.
-MEASURED = ("speed-error.md", "speed-error.csv", "speed-error.png")
+# Neither times nor a browser's picture can be reproduced: these are only listed here.
+_MADE_ELSEWHERE = (
+    Artefact(
+        dict.fromkeys(("speed-error.md", "speed-error.csv", "speed-error.png"), b""),
+        "speed against error: what the choices cost",
+        "measured on one machine; other machines give other times",
+        "mdfconv bench",
+    ),
+    Artefact(
+        {"comparison.png": b""},
+        "comparison.html in a browser",
+        "a picture of the page as it opens",
+        "make screenshot",
+    ),
+)
+ELSEWHERE = tuple(name for artefact in _MADE_ELSEWHERE for name in artefact.files)
 
 
 def build(folder: Path, processes: int | None = None) -> Iterator[Artefact]:
@@ -71,8 +87,8 @@ def build(folder: Path, processes: int | None = None) -> Iterator[Artefact]:
         write_files({folder / name: content for name, content in artefact.files.items()})
         artefacts.append(artefact)
         yield artefact
-    measured = [name for name in MEASURED if (folder / name).exists()]
-    write_files({folder / "README.md": file_bytes(_index(artefacts, measured))})
+    artefacts += [other for other in _MADE_ELSEWHERE if (folder / min(other.files)).exists()]
+    write_files({folder / "README.md": file_bytes(_index(artefacts))})
 
 
 def _made(processes: int) -> Iterator[Artefact]:
@@ -92,8 +108,8 @@ def _made(processes: int) -> Iterator[Artefact]:
         pool.shutdown(cancel_futures=True)
 
 
-def _index(artefacts: Sequence[Artefact], measured: Sequence[str]) -> str:
-    """Return the index; `measured` are files in the folder that another command made."""
+def _index(artefacts: Sequence[Artefact]) -> str:
+    """Return the index."""
     rows = [
         {
             "files": _links(artefact.files),
@@ -103,15 +119,6 @@ def _index(artefacts: Sequence[Artefact], measured: Sequence[str]) -> str:
         }
         for artefact in artefacts
     ]
-    if measured:
-        rows.append(
-            {
-                "files": _links(measured),
-                "reproduces": "speed against error: what the choices cost",
-                "agreement": "measured on one machine; other machines give other times",
-                "command": "`mdfconv bench`",
-            }
-        )
     return "\n".join(
         [
             "# Report",
@@ -123,5 +130,5 @@ def _index(artefacts: Sequence[Artefact], measured: Sequence[str]) -> str:
     )
 
 
-def _links(names: Sequence[str] | dict[str, bytes]) -> str:
+def _links(names: Iterable[str]) -> str:
     return ", ".join(f"[{name}]({name})" for name in names)

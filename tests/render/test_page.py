@@ -181,6 +181,7 @@ return {seen, requests: performance.getEntriesByType("resource").map((entry) => 
 """
 
 
+@pytest.mark.filterwarnings("ignore:.* clamps")
 @in_browser
 def test_numbers_in_a_browser_are_those_of_the_command(page, pair, tmp_path):
     answer, console = opened(tmp_path, page, MOVE)
@@ -193,6 +194,22 @@ def test_numbers_in_a_browser_are_those_of_the_command(page, pair, tmp_path):
         assert number == value
         expected = mdfconv.convert(float(number), source, target, metric=metric)
         assert float(shown.split(" = ")[1]) == pytest.approx(expected, rel=1e-3, abs=1e-5)
+
+
+COPY = """
+const copied = [];
+Object.defineProperty(navigator, "clipboard", {value: {writeText: async (text) => copied.push(text)}});
+byId("copy-number").click();
+byId("copy-command").click();
+return [copied, [state.number, byId("command").textContent]];
+"""
+
+
+@in_browser
+def test_buttons_copy_what_they_name(page, tmp_path):
+    (copied, shown), console = opened(tmp_path, page, COPY)
+    assert copied == shown
+    assert console == []
 
 
 @in_browser

@@ -14,12 +14,12 @@ test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n auto
 
 report: $(VENV)/installed
-	$(BIN)/mdfconv report --output reports
+	$(BIN)/mdfconv report --output reports --force
 
 # Times of this machine, as reports/speed-error.*
 bench: $(VENV)/installed
 	$(BIN)/mdfconv bench --format markdown --csv reports/speed-error.csv \
-	  --png reports/speed-error.png > reports/speed-error.tmp
+	  --png reports/speed-error.png --force > reports/speed-error.tmp
 	mv reports/speed-error.tmp reports/speed-error.md
 
 # The stored polynomials of the method fast, and the 50-digit values of the audit: minutes.

@@ -121,7 +121,8 @@ def command(
 ) -> None:
     """Render a sphere with one distribution put in another's place: Figures 3 to 5.
 
-    Writes a contact sheet (fig4.png, fig5.png) and the luminance through the highlight (CSV).
+    Writes a contact sheet (fig4.png, fig5.png) and the luminance through the highlight (CSV);
+    names say what differs from the paper's figures, such as fig4-gold.png.
     Prints RMSE and PSNR against Beckmann, in linear light and as displayed, and the ratios of
     peak and total energy; of a metal over all three channels, and the luminance is that of its
     colour. Without --material F is Schlick's for a grey dielectric of index 1.5. A distant light

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -85,19 +86,21 @@ def convert_files(
         If a file cannot be read, converted at all, or written; nothing is then changed.
     """
     from mdfconv.cli.outputs import Outputs
-    from mdfconv.output.files import find_files
+    from mdfconv.output.files import find_files, is_stream
     from mdfconv.scene.material_files import choose_outputs, read_file, write_conversions
 
     files = find_files(patterns)
     destinations = choose_outputs(files, output, in_place=in_place)
-    results = [each.output for each in destinations if not each.backup]
-    Outputs(*results, force=force, inputs=files)
+    results = [[] if each.backup else [each.output] for each in destinations]
+    Outputs(*chain(*results), force=force, inputs=files)
     converted = []
-    for destination in destinations:
+    for destination, result in zip(destinations, results, strict=True):
         data = read_file(destination.source)
         conversion = convert(destination, data)
+        if conversion.files and is_stream(destination.output):
+            raise MdfconvError(f"no texture can stand beside {destination.output}: it is no file")
         # Which textures there are is known only now.
-        Outputs(*conversion.files, force=force, inputs=[*files, *conversion.inputs])
+        Outputs(*result, *conversion.files, force=force, inputs=[*files, *conversion.inputs])
         converted.append((destination, data, conversion))
     written = write_conversions(converted, force=force)
     report([(destination, conversion) for destination, _, conversion in converted])

@@ -31,6 +31,8 @@ GROUP = typer.main.get_command(app)
 # How help shows what an option takes that names what is written.
 NAMES_A_FILE = {"FILE", "OUT", "DIR"}
 OLD = b"old"
+# With textures that are left the status is 1.
+DONE = 0, 1
 
 
 @dataclass
@@ -59,11 +61,21 @@ class Case:
 SMALLEST = "--size", "16", "--dpi", "10", "--m-b", "0.4"
 SMALL = *SMALLEST, "--mdf", "ggx", "--method", "peak"
 CASES = {
-    "mtl": Case(["mtl", "a.mtl", "--textures"], {"--output": "b.mtl"}, ("a.mtl",), ("x_Pr.png",)),
-    "gltf": Case(
-        ["gltf", "a.gltf", "--from", "blinn-phong:obj2gltf"], {"--output": "b.gltf"}, ("a.gltf",)
+    "mtl": Case(
+        ["mtl", "a.mtl", "--textures"], {"--output": "b.mtl"}, ("a.mtl", "x.png"), ("x_Pr.png",)
     ),
-    "mitsuba": Case(["mitsuba", "a.xml"], {"--output": "b.xml"}, ("a.xml",)),
+    "gltf": Case(
+        ["gltf", "a.gltf", "--from", "blinn-phong:obj2gltf", "--textures"],
+        {"--output": "b.gltf"},
+        ("a.gltf", "orm.png"),
+        ("orm_ggx-roughness.png",),
+    ),
+    "mitsuba": Case(
+        ["mitsuba", "a.xml", "--textures"],
+        {"--output": "b.xml"},
+        ("a.xml", "x.png"),
+        ("x_ggx.png",),
+    ),
     "texture": Case(
         ["texture", "x.png", "--from", "ggx:roughness", "--to", "ggx"],
         {"--output": "y.png", "--png": "hist.png"},
@@ -119,13 +131,15 @@ def _here(tmp_path, monkeypatch):
     monkeypatch.setattr("mdfconv.benchmark.stability.audit", lambda *_: [])
     Path("a.mtl").write_text("newmtl a\nNs 10\nmap_Ns x.png\n")
     Path("a.gltf").write_text(
-        '{"asset": {"version": "2.0"}, "materials": '
-        '[{"pbrMetallicRoughness": {"roughnessFactor": 0.5}}]}'
+        '{"asset": {"version": "2.0"}, "images": [{"uri": "orm.png"}], "textures": [{"source": 0}],'
+        '"materials": [{"pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}}}]}'
     )
     Path("a.xml").write_text(
-        '<scene version="3.0.0"><bsdf type="roughconductor">'
-        '<float name="alpha" value="0.2"/></bsdf></scene>\n'
+        '<scene version="3.0.0"><bsdf type="roughconductor"><texture type="bitmap" name="alpha">'
+        '<string name="filename" value="x.png"/><boolean name="raw" value="true"/>'
+        "</texture></bsdf></scene>\n"
     )
+    Image.new("RGB", (2, 2), (9, 99, 9)).save("orm.png")
     Image.fromarray(np.arange(64, dtype=np.uint8).reshape(8, 8)).save("x.png")
     beta = np.linspace(0, 1.5, 20)
     rows = [f"{angle},{np.exp(-np.square(np.tan(angle) / 0.3))}" for angle in beta]
@@ -229,10 +243,11 @@ def test_one_name_for_two_results_is_refused(name):
 )
 def test_an_input_is_not_written_over(name, option):
     case = CASES[name]
-    link = f"link{Path(case.inputs[0]).suffix}"
-    Path(link).symlink_to(case.inputs[0])
+    Path("link").symlink_to(case.inputs[0])
     before = state()
-    for path, force in itertools.product((case.inputs[0], link), ((), ("--force",))):
+    # What a file names is found to be read late: without --force only that it exists.
+    cases = [(path, ("--force",)) for path in (*case.inputs, "link")] + [(case.inputs[0], ())]
+    for path, force in cases:
         options = {**case.outputs, option: path}
         status, out, err = run(*case.words, *itertools.chain(*options.items()), *force)
         refusal = f"mdfconv: {path} is the input; write to another file\n"
@@ -253,7 +268,7 @@ def test_an_input_is_not_written_over(name, option):
 def test_pipes_and_devices_are_written_to(name, option):
     words = [word for word in CASES[name].words if word != "--textures"]
     assert read_from_pipe("pipe", *words, option, "pipe")
-    assert run(*words, option, "/dev/null")[0] == 0
+    assert run(*words, option, "/dev/null")[0] in DONE
     assert Path("/dev/null").is_char_device()
     status, _, err = run(*words, option, "/dev/full")
     assert (status, err) == (2, "mdfconv: cannot write /dev/full: No space left on device\n")
@@ -266,10 +281,35 @@ def read_from_pipe(name, *words):
     reader = Thread(target=lambda: read.append(Path(name).read_bytes()), daemon=True)
     reader.start()
     status, _, err = run(*words)
-    assert status == 0, err
+    assert status in DONE, err
     reader.join(10)
     assert Path(name).is_fifo()
     return read[0]
+
+
+@pytest.mark.parametrize("name", ["mtl", "mitsuba", "gltf"])
+def test_textures_do_not_go_beside_a_device(name):
+    before = state()
+    words = [*CASES[name].words, "--output", "/dev/null", "--force"]
+    assert run(*words) == (
+        2, "", "mdfconv: no texture can stand beside /dev/null: it is no file\n",
+    )  # fmt: skip
+    assert state() == before
+
+
+def test_pictures_of_a_page_are_found_before_anything_is_written():
+    words = *CASES["fit"].words, "--report", "page.md", "--output", "fit.csv"
+    before = state()
+    assert run(*words)[0] == 0
+    made = state().keys() - before.keys()
+    pictures = sorted(path for path in made if path.endswith(".png"))
+    for path in made - {pictures[-1]}:
+        Path(path).unlink()
+    kept = state()
+    status, out, err = run(*words)
+    assert (status, out) == (2, "")
+    assert err == f"mdfconv: {pictures[-1]} exists; it can be replaced (--force)\n"
+    assert state() == kept
 
 
 def test_a_texture_goes_into_a_pipe():

@@ -14,7 +14,7 @@ test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n auto
 
 report: $(VENV)/installed
-	$(BIN)/mdfconv report --output reports
+	$(BIN)/mdfconv report --output reports --force
 
 # The page of the report as a browser shows it.
 screenshot:
@@ -24,7 +24,7 @@ screenshot:
 # Times of this machine, as reports/speed-error.*
 bench: $(VENV)/installed
 	$(BIN)/mdfconv bench --format markdown --csv reports/speed-error.csv \
-	  --png reports/speed-error.png > reports/speed-error.tmp
+	  --png reports/speed-error.png --force > reports/speed-error.tmp
 	mv reports/speed-error.tmp reports/speed-error.md
 
 # The stored polynomials of the method fast, and the 50-digit values of the audit: minutes.

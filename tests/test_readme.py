@@ -13,7 +13,8 @@ from PIL import Image
 import mdfconv
 from tests.cli.runner import run
 
-README = (Path(__file__).parents[1] / "README.md").read_text()
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
 CONSOLE = re.findall(r"```console\n(.*?)```", README, re.S)
 
 
@@ -23,6 +24,20 @@ def examples():
         for chunk in re.split(r"^\$ ", block, flags=re.M)[1:]:
             line, _, expected = chunk.partition("\n")
             yield line, expected
+
+
+@pytest.fixture(autouse=True)
+def _checkout(tmp_path):
+    """A folder with the tracked files that commands would write by default: none may change."""
+    reports = tmp_path / "reports"
+    reports.mkdir()
+    names = [path.name for path in (ROOT / "reports").iterdir()]
+    for name in names:
+        (reports / name).write_text("tracked")
+    yield
+    assert {path.name: path.read_text() for path in reports.iterdir()} == dict.fromkeys(
+        names, "tracked"
+    )
 
 
 @pytest.mark.parametrize(("line", "expected"), list(examples()))
@@ -98,7 +113,22 @@ def test_recipe(line, tmp_path):
     assert out or "wrote" in err
 
 
+# Lines of commands that write into ./reports, which is tracked, if they name no folder.
+DRAWING = re.findall(r"^ {4}(mdfconv (?:plot-error|compare|report)\b.*?)(?: *#.*)?$", README, re.M)
+SMALL = {"compare": ["--size", "64", "--dpi", "20"], "plot-error": ["--dpi", "20"]}
+
+
+@pytest.mark.parametrize("line", DRAWING)
+def test_pictures_go_into_a_folder_that_git_ignores(line, tmp_path):
+    words = shlex.split(line)[1:]
+    status, _, err = run(*words, *SMALL[words[0]], cwd=tmp_path)
+    assert status == 0, err
+    assert list((tmp_path / "out").iterdir())
+    assert "out/" in (ROOT / ".gitignore").read_text().splitlines()
+
+
 def test_there_are_recipes():
+    assert len(DRAWING) > 3
     commands = {line.split()[1] for line in RECIPES}
     assert {"mtl", "gltf", "texture", "mitsuba", "convert", "formula", "fit"} <= commands
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.options import Format, FormatOption, PngOption
-from mdfconv.cli.outputs import check_outputs, write_named
+from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption
+from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import form_of, progress, table_text, write_table
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import json_text
@@ -70,6 +70,7 @@ def command(
         Path | None, typer.Option(metavar="FILE", help="Write tables and machine as JSON.")
     ] = None,
     png: PngOption = None,
+    force: ForceOption = False,
 ) -> None:
     """Measure speed against error on this machine.
 
@@ -91,7 +92,7 @@ def command(
     """
     from mdfconv.benchmark.measure import measure
 
-    check_outputs(csv, json, png)
+    outputs = Outputs(csv, json, png, force=force)
     task = _task(reference, parameter, source, target, quick=quick)
     with progress("Measuring", task.steps) as advance:
         measurements = measure(task, advance)
@@ -104,7 +105,7 @@ def command(
         from mdfconv.benchmark.figure import draw
 
         contents[png] = draw(measurements)
-    write_named(contents)
+    outputs.write(contents)
     _print(measurements, form_of(format_), png)
 
 

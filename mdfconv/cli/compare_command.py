@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,12 +15,13 @@ from mdfconv.cli import completion
 from mdfconv.cli.options import (
     DpiOption,
     FolderOption,
+    ForceOption,
     FormatOption,
     MdfOption,
     MethodOption,
     chosen_metric,
 )
-from mdfconv.cli.outputs import check_folder, check_outputs, write_named
+from mdfconv.cli.outputs import Outputs, check_folder, value_name
 from mdfconv.cli.tables import write_table
 from mdfconv.distributions import one_parameter_distribution
 from mdfconv.errors import MdfconvError
@@ -25,7 +29,7 @@ from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text
 
 if TYPE_CHECKING:
-    from mdfconv.render.comparison import Rule
+    from mdfconv.render.comparison import Rule, Scene
 
 _COLUMNS = (
     "figure", "conversion", "distribution", "parameter", "rmse_linear", "psnr_linear",
@@ -112,11 +116,13 @@ def command(
     ] = _REFERENCE,
     dpi: DpiOption = 120,
     output: FolderOption = None,
+    force: ForceOption = False,
     format_: FormatOption = None,
 ) -> None:
     """Render a sphere with one distribution put in another's place: Figures 3 to 5.
 
-    Writes a contact sheet (fig4.png, fig5.png) and the luminance through the highlight (CSV).
+    Writes a contact sheet (fig4.png, fig5.png) and the luminance through the highlight (CSV);
+    names say what differs from the paper's figures, such as fig4-gold.png.
     Prints RMSE and PSNR against Beckmann, in linear light and as displayed, and the ratios of
     peak and total energy; of a metal over all three channels, and the luminance is that of its
     colour. Without --material F is Schlick's for a grey dielectric of index 1.5. A distant light
@@ -142,10 +148,11 @@ def command(
 
     mdfconv compare --from blinn-phong --mdf ggx:roughness --html page.html
     """
-    if html is not None:
-        _write_page(html, source, (mdf or ["ggx"])[0], m_b)
-        if output is None:
-            return
+    outputs = Outputs(html, force=force)
+    page = partial(_page, source, (mdf or ["ggx"])[0], m_b)
+    if html is not None and output is None:
+        outputs.write({html: page()})
+        return
     from mdfconv.paper.error_curves import DRAWN
     from mdfconv.render.comparison import PAPER_FIGURES, Scene, compare
     from mdfconv.render.comparison_figure import draw_comparison
@@ -155,29 +162,61 @@ def command(
     rules = _rules(method, metric, exposure)
     names = list(dict.fromkeys(one_parameter_distribution(name).name for name in mdf or DRAWN))
     scene = Scene(brdf.value, light.value, normalized, exposure, size, material)
+    given = {f"compare-m_b-{value_name(value)}": value for value in m_b or ()}
+    figures = {
+        _figure_name(start, scene, rules, names): value
+        for start, value in (given or PAPER_FIGURES).items()
+    }
     folder = check_folder(output)
-    figures = {f"compare-m_b-{value:g}": value for value in m_b or ()}
+    outputs.check(*(folder / f"{name}.{end}" for name in figures for end in ("csv", "png")))
     rows: list[dict[str, Any]] = []
-    contents: dict[Path, bytes] = {}
-    for name, value in (figures or PAPER_FIGURES).items():
+    contents = {html: page()} if html else {}
+    for name, value in figures.items():
         comparison = compare(value, rules, scene, names)
         rows += [{"figure": name} | row for row in comparison.table()]
         columns, section = comparison.section_rows()
         contents[folder / f"{name}.csv"] = file_bytes(csv_text(columns, section))
         contents[folder / f"{name}.png"] = draw_comparison(comparison, dpi)
-    write_named(contents)
+    outputs.write(contents)
     write_table(_COLUMNS, rows, format_, title="Pictures against Beckmann's")
 
 
-def _write_page(path: Path, source: str, target: str, m_b: list[float] | None) -> None:
+def _figure_name(start: str, scene: Scene, rules: Sequence[Rule], names: Sequence[str]) -> str:
+    """Return the name of a figure: a word for all that is not as usual but the number of pixels."""
+    from mdfconv.conversion import method_named
+    from mdfconv.paper.error_curves import DRAWN
+    from mdfconv.render.comparison import Scene, default_rules
+
+    usual, words = Scene(), [start]
+    if tuple(names) != DRAWN:
+        words += names
+    if [rule.label for rule in rules] != [rule.label for rule in default_rules(scene.exposure)]:
+        for rule in rules:
+            kept = [str(rule.metric)] if method_named(rule.method).follows_metric else []
+            words += [rule.method, *kept]
+    words += [
+        word
+        for word, differs in (
+            (scene.brdf, scene.brdf != usual.brdf),
+            (scene.light, scene.light != usual.light),
+            ("unit-form", scene.normalized != usual.normalized),
+            (f"exposure-{value_name(scene.exposure)}", scene.exposure != usual.exposure),
+            (scene.material or "", scene.material != usual.material),
+        )
+        if differs
+    ]
+    # A metric can name a file, which may stand in a folder.
+    return re.sub(r"[^\w.+-]+", "-", "-".join(words))
+
+
+def _page(source: str, target: str, m_b: list[float] | None) -> bytes:
     from mdfconv.conversion.endpoint import endpoint
     from mdfconv.render.page import comparison_page
 
-    check_outputs(path)
     ends = endpoint(source), endpoint(target)
     if m_b and ends[0].distribution.name != _REFERENCE:
         raise MdfconvError(f"--m-b is the parameter of {_REFERENCE}, not of {ends[0].label}")
-    write_named({path: comparison_page(*ends, m_b[0] if m_b else None)})
+    return comparison_page(*ends, m_b[0] if m_b else None)
 
 
 def _rules(method: str | None, metric: str | None, exposure: float) -> list[Rule]:

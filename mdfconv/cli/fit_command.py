@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli.options import (
+    ForceOption,
     Format,
     FormatOption,
     GammaOption,
@@ -22,10 +23,9 @@ from mdfconv.cli.options import (
     PngOption,
     chosen_gamma,
 )
-from mdfconv.cli.outputs import check_outputs
-from mdfconv.cli.tables import form_of, progress, table_text, tell, write_table
+from mdfconv.cli.outputs import Outputs
+from mdfconv.cli.tables import form_of, progress, tell, write_table
 from mdfconv.errors import MdfconvError
-from mdfconv.output.files import file_bytes, write_files
 
 if TYPE_CHECKING:
     from mdfconv.distributions import Distribution
@@ -175,6 +175,7 @@ def command(
             help="Write a page for a colleague: .html, or .md with its pictures.",
         ),
     ] = None,
+    force: ForceOption = False,
 ) -> None:
     """Fit distributions to measured reflectance or to a measured distribution of normals.
 
@@ -199,7 +200,7 @@ def command(
     from mdfconv.output.files import find_files
 
     files = find_files(data)
-    outputs = check_outputs(png, output, report, inputs=files)
+    outputs = Outputs(png, report, table=output, force=force, inputs=files)
     if len(files) > 1 and (png or report):
         raise MdfconvError("--png and --report are of one file")
     options = _options(
@@ -214,7 +215,7 @@ def command(
     analyses = _analyses(files, columns, options, only_two=only_two)
     form = form_of(format_, output)
     names, rows = _table(analyses, form, separate)
-    contents = {output: file_bytes(table_text(names, rows, form))} if output else {}
+    contents: dict[Path, bytes] = {}
     logarithms = loss is Loss.log
     if png:
         from mdfconv.reports.fit_pages import draw_analysis
@@ -222,12 +223,8 @@ def command(
         contents[png] = draw_analysis(analyses[0], logarithms=logarithms)
     if report:
         contents |= _report(analyses[0], report, separate=separate, logarithms=logarithms)
-    if len(contents) > len(outputs):
-        check_outputs(*(path for path in contents if path not in outputs), inputs=files)
-    write_files(contents)
-    if not output:
-        title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
-        write_table(names, rows, form, title=title)
+    title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
+    write_table(names, rows, form, outputs, beside=contents, title=title)
     for analysis in analyses:
         _tell(analysis, tolerance, named=len(analyses) > 1)
 

@@ -8,12 +8,14 @@ import typer
 
 from mdfconv.cli.options import (
     ExposureOption,
+    ForceOption,
     FormatOption,
     MetricOption,
     OutputOption,
     chosen_metric,
     every_metric,
 )
+from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import progress, write_table
 from mdfconv.errors import MdfconvError
 
@@ -52,6 +54,7 @@ def command(
         bool,
         typer.Option("--closed-forms", help="Refit the coefficients of the paper's formulas."),
     ] = False,
+    force: ForceOption = False,
 ) -> None:
     """Reproduce Table 2 of Sawicki 2021: Beckmann fitted by the others over a sweep of m_B.
 
@@ -75,9 +78,10 @@ def command(
             "--compare and --closed-forms speak of the paper's rows: give one of them, without "
             "--sweep, --m-b or --extended"
         )
+    outputs = Outputs(table=output, force=force)
     if closed_forms:
         columns, rows, title = _closed_forms(exposure)
-        write_table(columns, rows, format_, output, title=title)
+        write_table(columns, rows, format_, outputs, title=title)
         return
     kept = chosen_metric(metric, exposure)
     if compare and kept.name != "unit":
@@ -86,7 +90,7 @@ def command(
         columns, rows, title = _comparison()
     else:
         columns, rows, title = _table(kept, sweep, m_b, extended)
-    write_table(columns, rows, format_, output, title=title)
+    write_table(columns, rows, format_, outputs, title=title)
 
 
 def _comparison() -> tuple[list[str], list[dict[str, Any]], str]:

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli.options import FormatOption, OutputOption, PngOption
-from mdfconv.cli.outputs import check_outputs, write_named
+from mdfconv.cli.options import ForceOption, FormatOption, OutputOption, PngOption
+from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 
 
@@ -25,6 +25,7 @@ def command(
     format_: FormatOption = None,
     output: OutputOption = None,
     png: PngOption = None,
+    force: ForceOption = False,
 ) -> None:
     """Fit the Fresnel term of the Smoothie article: exp2(a + b l.h), h = l + v not normalized.
 
@@ -44,11 +45,10 @@ def command(
     from mdfconv.brdf.fresnel_fit import fit
     from mdfconv.reports.fresnel_page import COLUMNS, draw_fresnel, error_rows
 
-    check_outputs(png, output)
+    outputs = Outputs(png, table=output, force=force)
     fitted = fit(ior, mu, sigma)
     title = (
         f"exp2({fitted.a:.6g} {fitted.b:+.6g} l·h), IOR {ior:g}, weight {mu:g} ± {sigma:g} in l·h"
     )
-    if png:
-        write_named({png: draw_fresnel(fitted)})
-    write_table(COLUMNS, error_rows(fitted), format_, output, title=title)
+    picture = {png: draw_fresnel(fitted)} if png else {}
+    write_table(COLUMNS, error_rows(fitted), format_, outputs, beside=picture, title=title)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.options import Format, FormatOption, OutputOption, PngOption
-from mdfconv.cli.outputs import check_outputs, write_named
+from mdfconv.cli.options import ForceOption, Format, FormatOption, OutputOption, PngOption
+from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 from mdfconv.errors import MdfconvError
 
@@ -70,6 +69,7 @@ def command(
     png: PngOption = None,
     format_: FormatOption = None,
     output: OutputOption = None,
+    force: ForceOption = False,
 ) -> None:
     """Put a BRDF that absorbs nothing into a white furnace: how much light comes back.
 
@@ -96,7 +96,7 @@ def command(
             raise MdfconvError("--speed compares the normalizers of --brdf modified-phong")
         if normalizer or samples or png:
             raise MdfconvError("--speed takes no --normalizer, --mc or --png: it is a table of all")
-        _write_speed(parameter, format_, output)
+        _write_speed(parameter, format_, Outputs(table=output, force=force))
         return
     if not 2 <= points <= _MOST_POINTS:
         raise MdfconvError(f"--points is from 2 to {_MOST_POINTS}")
@@ -108,16 +108,18 @@ def command(
         )
     if seed < 0:
         raise MdfconvError(f"--seed is at least 0, not {seed}")
-    check_outputs(png, output)
+    outputs = Outputs(png, table=output, force=force)
     model = furnace_model(brdf, parameter, normalizer=normalizer, masking=masking)
     rows = _rows(model, np.linspace(0, 1, points), samples, seed)
     label = f"{brdf} {parameter:g}"
+    picture = {}
     if png:
         from mdfconv.reports.furnace_figure import draw_albedo
 
         curve = {label: [row["albedo"] for row in rows]}
-        write_named({png: draw_albedo([row["cos_theta"] for row in rows], {"": curve})})
-    write_table(list(rows[0]), rows, format_, output, title=f"White furnace: {label}")
+        picture[png] = draw_albedo([row["cos_theta"] for row in rows], {"": curve})
+    title = f"White furnace: {label}"
+    write_table(list(rows[0]), rows, format_, outputs, beside=picture, title=title)
 
 
 def _rows(
@@ -132,9 +134,9 @@ def _rows(
     return rounded_rows(columns)
 
 
-def _write_speed(exponent: float, form: Format | None, output: Path | None) -> None:
+def _write_speed(exponent: float, form: Format | None, outputs: Outputs) -> None:
     from mdfconv.benchmark.normalizers import normalizer_speeds
 
     rows = normalizer_speeds(exponent)
     title = f"Normalizers of modified Phong, γ = {exponent:g}"
-    write_table(list(rows[0]), rows, form, output, title=title)
+    write_table(list(rows[0]), rows, form, outputs, title=title)

@@ -21,7 +21,13 @@ from mdfconv.cli.material_files import (
     print_importers,
     print_materials,
 )
-from mdfconv.cli.options import ExposureOption, MetricOption, SpecularOption, chosen_metric
+from mdfconv.cli.options import (
+    ExposureOption,
+    ForceOption,
+    MetricOption,
+    SpecularOption,
+    chosen_metric,
+)
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import json_text
 
@@ -58,6 +64,7 @@ def command(
     exposure: ExposureOption = None,
     specular: SpecularOption = None,
     in_place: InPlaceOption = False,
+    force: ForceOption = False,
     textures: Annotated[
         bool,
         typer.Option(
@@ -114,6 +121,7 @@ def command(
         chosen_metric(metric, exposure),
         specular=specular,
         in_place=in_place,
+        force=force,
         textures=textures,
         lossy=lossy,
         compare=compare,
@@ -130,6 +138,7 @@ def _convert(
     *,
     specular: float | None,
     in_place: bool,
+    force: bool,
     textures: bool,
     lossy: bool,
     compare: bool,
@@ -159,6 +168,7 @@ def _convert(
         files,
         output,
         in_place=in_place,
+        force=force,
         convert=convert,
         report=lambda converted: _report(converted, metric, names, form=form, compare=compare),
     )

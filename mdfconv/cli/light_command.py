@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mdfconv.cli.options import Format, FormatOption, PngOption
-from mdfconv.cli.outputs import check_outputs, write_named
+from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption
+from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import console, form_of, tell, write_table
 from mdfconv.output.records import csv_text, json_text
 
@@ -36,6 +36,7 @@ def command(
         Path | None, typer.Option("--csv", metavar="FILE", help="Write the spectrum as CSV.")
     ] = None,
     png: PngOption = None,
+    force: ForceOption = False,
     format_: FormatOption = None,
 ) -> None:
     """Say what a light asks of a conversion: its spectrum, and the best GGX for Beckmann.
@@ -55,7 +56,7 @@ def command(
     from mdfconv.output.files import file_bytes
     from mdfconv.scene.light import light_report
 
-    check_outputs(png, spectrum, inputs=[map_])
+    outputs = Outputs(png, spectrum, force=force, inputs=[map_])
     report = light_report(map_, m_b or _ROUGHNESSES)
     contents: dict[Path, bytes] = {}
     if spectrum:
@@ -65,8 +66,8 @@ def command(
         from mdfconv.scene.light_figure import draw_spectrum
 
         contents[png] = draw_spectrum(report.spectrum, map_.name)
+    outputs.write(contents)
     _write(report, map_, form_of(format_))
-    write_named(contents)
 
 
 def _write(report: LightReport, path: Path, form: Format) -> None:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -40,7 +41,7 @@ ResultOption = Annotated[
         "--output",
         "-o",
         metavar="OUT",
-        help="New file, or a folder: one that exists, or out/ with a slash.",
+        help="File, or a folder: one that exists, or out/ with a slash.",
     ),
 ]
 InPlaceOption = Annotated[
@@ -58,6 +59,7 @@ def convert_files(
     output: str | None,
     *,
     in_place: bool,
+    force: bool,
     convert: Callable[[Destination, bytes], Conversion],
     report: Callable[[list[tuple[Destination, Conversion]]], None],
 ) -> None:
@@ -68,9 +70,11 @@ def convert_files(
     patterns : sequence of str
         Names and glob patterns.
     output : str or None
-        A new file, or a folder; None in place.
+        A file, or a folder; None in place.
     in_place : bool
         Whether the files themselves change.
+    force : bool
+        Whether files that exist are replaced.
     convert : callable
         From where a file goes, and its bytes, to its conversion.
     report : callable
@@ -81,14 +85,24 @@ def convert_files(
     MdfconvError
         If a file cannot be read, converted at all, or written; nothing is then changed.
     """
-    from mdfconv.output.files import find_files
+    from mdfconv.cli.outputs import Outputs
+    from mdfconv.output.files import find_files, is_stream
     from mdfconv.scene.material_files import choose_outputs, read_file, write_conversions
 
+    files = find_files(patterns)
+    destinations = choose_outputs(files, output, in_place=in_place)
+    results = [[] if each.backup else [each.output] for each in destinations]
+    Outputs(*chain(*results), force=force, inputs=files)
     converted = []
-    for destination in choose_outputs(find_files(patterns), output, in_place=in_place):
+    for destination, result in zip(destinations, results, strict=True):
         data = read_file(destination.source)
-        converted.append((destination, data, convert(destination, data)))
-    written = write_conversions(converted)
+        conversion = convert(destination, data)
+        if conversion.files and is_stream(destination.output):
+            raise MdfconvError(f"no texture can stand beside {destination.output}: it is no file")
+        # Which textures there are is known only now.
+        Outputs(*result, *conversion.files, force=force, inputs=[*files, *conversion.inputs])
+        converted.append((destination, data, conversion))
+    written = write_conversions(converted, force=force)
     report([(destination, conversion) for destination, _, conversion in converted])
     problems = False
     for destination, _, conversion in converted:

@@ -15,7 +15,7 @@ from mdfconv.cli.material_files import (
     convert_files,
     number_cell,
 )
-from mdfconv.cli.options import ExposureOption, MetricOption, chosen_metric
+from mdfconv.cli.options import ExposureOption, ForceOption, MetricOption, chosen_metric
 from mdfconv.cli.tables import ROWS_SHOWN, print_table, rich_table, tell, tell_rest
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import json_text
@@ -40,6 +40,7 @@ def command(
     metric: MetricOption = "environment",
     exposure: ExposureOption = None,
     in_place: InPlaceOption = False,
+    force: ForceOption = False,
     textures: Annotated[
         bool,
         typer.Option("--textures", help="Convert the bitmaps of alpha, too, beside the result."),
@@ -80,7 +81,7 @@ def command(
         if bitmaps is None:
             return conversion
         files = bitmaps.files({texture.result for texture in conversion.textures})
-        return dataclasses.replace(conversion, files=files)
+        return dataclasses.replace(conversion, files=files, inputs=bitmaps.inputs)
 
     def report(converted: list[tuple[Destination, MitsubaConversion]]) -> None:
         if format_ is ReportFormat.json:
@@ -92,7 +93,7 @@ def command(
             _print_table(record)
             tell_rest(len(each[1].materials), "--format json")
 
-    convert_files(scenes, output, in_place=in_place, convert=convert, report=report)
+    convert_files(scenes, output, in_place=in_place, force=force, convert=convert, report=report)
 
 
 def _record(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -20,7 +19,7 @@ from mdfconv.cli.material_files import (
     print_importers,
     print_materials,
 )
-from mdfconv.cli.options import ExposureOption, MetricOption, chosen_metric
+from mdfconv.cli.options import ExposureOption, ForceOption, MetricOption, chosen_metric
 from mdfconv.cli.tables import progress
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import json_text
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.material_files import Destination
     from mdfconv.scene.mtl import Material, MtlConversion
+    from mdfconv.scene.mtl_textures import MtlTextures
 
 
 def command(
@@ -51,6 +51,7 @@ def command(
         bool, typer.Option("--replace", help="Drop the statement that was converted.")
     ] = False,
     in_place: InPlaceOption = False,
+    force: ForceOption = False,
     textures: Annotated[
         bool,
         typer.Option(
@@ -91,17 +92,22 @@ def command(
     kept = chosen_metric(metric, exposure)
 
     def convert(destination: Destination, data: bytes) -> MtlConversion:
-        names, files, problems = (
-            _convert_textures(destination, data, kept, exponent_max) if textures else ({}, {}, [])
+        if not textures:
+            return convert_mtl(data, wanted, metric=kept, replace=replace)
+        new = _convert_textures(destination, data, kept, exponent_max)
+        conversion = convert_mtl(
+            data, wanted, metric=kept, replace=replace, texture_names=new.names
         )
-        conversion = convert_mtl(data, wanted, metric=kept, replace=replace, texture_names=names)
-        every = (*problems, *conversion.problems)
-        return dataclasses.replace(conversion, files=files, problems=every)
+        problems = (*new.problems, *conversion.problems)
+        return dataclasses.replace(
+            conversion, files=new.files, inputs=new.inputs, problems=problems
+        )
 
     convert_files(
         libraries,
         output,
         in_place=in_place,
+        force=force,
         convert=convert,
         report=lambda converted: _report(converted, kept, form=format_, compare=compare),
     )
@@ -109,8 +115,8 @@ def command(
 
 def _convert_textures(
     destination: Destination, data: bytes, metric: Metric, exponent_max: float
-) -> tuple[dict[str, str], dict[Path, bytes], list[tuple[int, str]]]:
-    """Convert the textures of a library; return new names, new files, and problems by line."""
+) -> MtlTextures:
+    """Convert the textures of a library."""
     from mdfconv.scene.mtl import texture_statements
     from mdfconv.scene.mtl_textures import convert_textures
 

@@ -130,6 +130,9 @@ FolderOption = Annotated[
         help="Folder to write to, created if it is not there; by default ./reports.",
     ),
 ]
+ForceOption = Annotated[
+    bool, typer.Option("--force", help="Write over files that exist; else they are refused.")
+]
 PngOption = Annotated[
     Path | None, typer.Option("--png", metavar="FILE", help="Draw the result into a picture.")
 ]

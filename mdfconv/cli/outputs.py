@@ -4,37 +4,98 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 
-from mdfconv.cli.tables import tell
+from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
-from mdfconv.output.files import create_folder, is_stream, write_files
+from mdfconv.output.files import (
+    StagedFiles,
+    create_folder,
+    exists_refusal,
+    is_stream,
+    staged_files,
+)
 
 _DEFAULT_FOLDER = Path("reports")
 
 
-def check_outputs(*outputs: Path | None, inputs: Sequence[Path] = ()) -> list[Path]:
-    """Return the outputs that are named, if each can be written.
+class Outputs:
+    """The files that a command writes: checked when they are named, written all or none.
+
+    Parameters
+    ----------
+    *files : Path or None
+        Those that are known before the work, None for one that is not wanted.
+    force : bool
+        Whether a file that exists is replaced, not refused.
+    table : Path or None
+        Where `write_table` writes, if not to standard output.
+    inputs : sequence of Path
+        What is read, and must not be written over.
 
     Raises
     ------
     MdfconvError
-        If two have one name, one is an input or a folder, or its folder is missing or closed.
+        As `check`.
     """
-    named = [path for path in outputs if path is not None]
-    for number, path in enumerate(named):
-        if path.resolve() in [other.resolve() for other in named[:number]]:
+
+    def __init__(
+        self,
+        *files: Path | None,
+        force: bool,
+        table: Path | None = None,
+        inputs: Sequence[Path] = (),
+    ) -> None:
+        self.table = table
+        self._force, self._inputs = force, inputs
+        self._checked: set[Path] = set()
+        self.check(*files, table)
+
+    def check(self, *files: Path | None) -> None:
+        """Check files that are named later than the others.
+
+        Raises
+        ------
+        MdfconvError
+            If two have one name, one exists, is an input or a folder, or its folder is missing or
+            closed.
+        """
+        for path in (path for path in files if path is not None):
+            try:
+                self._check(path)
+            except (OSError, RuntimeError) as error:
+                reason = getattr(error, "strerror", None) or error
+                raise MdfconvError(f"cannot write {path}: {reason}") from None
+
+    def _check(self, path: Path) -> None:
+        if path.resolve() in self._checked:
             raise MdfconvError(f"{path} is named for two results", "give each its own file")
-        if any(path.exists() and other.exists() and path.samefile(other) for other in inputs):
+        self._checked.add(path.resolve())
+        if any(path.exists() and other.exists() and path.samefile(other) for other in self._inputs):
             raise MdfconvError(f"{path} is the input", "write to another file")
         if path.is_dir():
             raise MdfconvError(f"cannot write {path}: Is a directory")
+        if path.exists() and not is_stream(path) and not self._force:
+            raise exists_refusal(path)
         place = path if is_stream(path) else path.resolve().parent
         if place != path and not place.is_dir():
             raise MdfconvError(f"cannot write {path}: {path.parent} is not an existing directory")
         if not os.access(place, os.W_OK):
             raise MdfconvError(f"cannot write {path}: Permission denied")
-    return named
+
+    def staged(self) -> AbstractContextManager[StagedFiles]:
+        """Return what takes the files and places all or none, without --force over no other."""
+        return staged_files(lambda path: not self._force)
+
+    def write(self, contents: Mapping[Path, bytes]) -> None:
+        """Write files that are ready, all or none, and say so on standard error."""
+        self.check(*(path for path in contents if path.resolve() not in self._checked))
+        with self.staged() as files:
+            for path, content in contents.items():
+                files.add(path, content)
+        for path in contents:
+            tell(f"wrote {path}")
 
 
 def check_folder(folder: Path | None) -> Path:
@@ -52,8 +113,6 @@ def check_folder(folder: Path | None) -> Path:
     return chosen
 
 
-def write_named(contents: Mapping[Path, bytes]) -> None:
-    """Write files that are ready, all or none, and say so on standard error."""
-    write_files(contents)
-    for path in contents:
-        tell(f"wrote {path}")
+def value_name(value: float) -> str:
+    """Return a number for the name of a file, which it shares with no other number."""
+    return repr(float(value)).removesuffix(".0")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,13 +12,14 @@ from mdfconv.cli.options import (
     DpiOption,
     ExposureOption,
     FolderOption,
+    ForceOption,
     FormatOption,
     MdfOption,
     MethodOption,
     OptionalMetricOption,
     asked_metric,
 )
-from mdfconv.cli.outputs import check_folder, write_named
+from mdfconv.cli.outputs import Outputs, check_folder, value_name
 from mdfconv.cli.tables import write_table
 from mdfconv.distributions import one_parameter_distribution
 from mdfconv.errors import MdfconvError
@@ -51,6 +51,7 @@ def command(
     ] = _REFERENCE,
     mdf: MdfOption = None,
     output: FolderOption = None,
+    force: ForceOption = False,
     png: Annotated[bool, typer.Option("--png/--no-png", help="Write pictures.")] = True,
     csv: Annotated[bool, typer.Option("--csv/--no-csv", help="Write the errors.")] = True,
     svg: Annotated[bool, typer.Option("--svg", help="Write pictures as SVG, too.")] = False,
@@ -73,29 +74,30 @@ def command(
     mdfconv plot-error --m-b 0.2 --reference ggx --mdf beckmann --no-csv --output /tmp
     """
     asked = asked_metric(metric, exposure)
+    sets = _sets(m_b, method, asked, reference, mdf)
+    endings = [*[".png"] * png, *[".svg"] * svg, *["b.csv"] * csv]
     folder = check_folder(output)
-    figures = _curves(m_b, method, asked, reference, mdf, points)
-    contents: dict[Path, bytes] = {}
-    rows: list[dict[str, Any]] = []
-    for name, drawn in figures.items():
-        rows += [{"figure": name} | row for row in drawn.maxima()]
-        for file, content in _files(name, drawn, png=png, csv=csv, svg=svg, dpi=dpi, log=log):
-            contents[folder / file] = content
-    chief = next(iter(figures.values())).reference
-    write_named(contents)
-    write_table(_COLUMNS, rows, format_, title=f"Largest error against {chief}")
+    outputs = Outputs(*(folder / f"{name}{end}" for name in sets for end in endings), force=force)
+    figures = _curves(sets, reference, asked, points)
+    contents = {
+        folder / f"{name}{end}": _file(name, drawn, end, dpi=dpi, log=log)
+        for name, drawn in figures.items()
+        for end in endings
+    }
+    rows = [{"figure": name} | row for name, drawn in figures.items() for row in drawn.maxima()]
+    title = f"Largest error against {one_parameter_distribution(reference).name}"
+    write_table(_COLUMNS, rows, format_, outputs, beside=contents, title=title)
 
 
-def _curves(
+def _sets(
     m_b: list[float] | None,
     method: str | None,
     metric: Metric | None,
     reference: str,
     mdf: list[str] | None,
-    points: int,
-) -> dict[str, Curves]:
-    from mdfconv.conversion.arrays import given_metric
-    from mdfconv.paper.error_curves import DRAWN, PAPER_SETS, curves, parameters_for
+) -> dict[str, dict[str, float]]:
+    """Return the parameters of each figure by its name."""
+    from mdfconv.paper.error_curves import DRAWN, PAPER_SETS, parameters_for
 
     chief = one_parameter_distribution(reference).name
     names = list(dict.fromkeys(one_parameter_distribution(name).name for name in mdf or ()))
@@ -103,7 +105,7 @@ def _curves(
         names = names or [name for name in (_REFERENCE, *DRAWN) if name != chief]
         wanted = dict.fromkeys([chief, *names])
         sets = {
-            f"error-m_b-{value:g}": parameters_for(value, list(wanted), method, metric)
+            f"error-m_b-{value_name(value)}": parameters_for(value, list(wanted), method, metric)
             for value in m_b
         }
     else:
@@ -119,18 +121,24 @@ def _curves(
         }
     if any(set(parameters) == {chief} for parameters in sets.values()):
         raise MdfconvError(f"{chief} is the reference: name another --mdf to compare with it")
-    shown = given_metric(metric)
+    return sets
+
+
+def _curves(
+    sets: Mapping[str, dict[str, float]], reference: str, metric: Metric | None, points: int
+) -> dict[str, Curves]:
+    from mdfconv.conversion.arrays import given_metric
+    from mdfconv.paper.error_curves import curves
+
+    chief, shown = one_parameter_distribution(reference).name, given_metric(metric)
     return {name: curves(parameters, chief, shown, points) for name, parameters in sets.items()}
 
 
-def _files(
-    name: str, drawn: Curves, *, png: bool, csv: bool, svg: bool, dpi: int, log: bool
-) -> Iterator[tuple[str, bytes]]:
-    """Yield the files of a figure by their names."""
+def _file(name: str, drawn: Curves, end: str, *, dpi: int, log: bool) -> bytes:
+    """Return the content of a figure's file by what its name ends in."""
+    if end == "b.csv":
+        return file_bytes(drawn.error_text())
     from mdfconv.paper.error_figure import draw_errors
 
     title = f"{drawn.reference} and its substitutes ({name})"
-    for form in ["png"] * png + ["svg"] * svg:
-        yield f"{name}.{form}", draw_errors(drawn, title, form=form, dpi=dpi, log=log)
-    if csv:
-        yield f"{name}b.csv", file_bytes(drawn.error_text())
+    return draw_errors(drawn, title, form=end.removeprefix("."), dpi=dpi, log=log)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import typer
 
-from mdfconv.cli.options import FolderOption
+from mdfconv.cli.options import FolderOption, ForceOption
+from mdfconv.cli.outputs import Outputs, check_folder
 from mdfconv.cli.tables import progress
 
 
 def command(
     output: FolderOption = None,
+    force: ForceOption = False,
 ) -> None:
     """Write every table and figure, and an index (README.md) that says what each one is.
 
@@ -21,12 +21,18 @@ def command(
 
     mdfconv report --output /tmp/mdfconv-report
     """
-    from mdfconv.reports.build import COUNT, build
+    from mdfconv.reports.build import COUNT, ELSEWHERE, FILES, build, report_files
 
-    folder = output or Path("reports")
-    written: list[str] = []
+    folder = check_folder(output)
+    outputs = Outputs(*(folder / name for name in FILES), force=force)
+    artefacts = []
     with progress("Report", COUNT) as advance:
-        for artefact in build(folder):
-            written += [str(folder / name) for name in artefact.files]
+        for artefact in build():
+            artefacts.append(artefact)
             advance(1)
-    typer.echo("\n".join([*written, str(folder / "README.md")]))
+    present = [name for name in ELSEWHERE if (folder / name).exists()]
+    contents = {
+        folder / name: content for name, content in report_files(artefacts, present).items()
+    }
+    outputs.write(contents)
+    typer.echo("\n".join(map(str, contents)))

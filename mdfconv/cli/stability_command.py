@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli.options import FormatOption, MdfOption, OutputOption
+from mdfconv.cli.options import ForceOption, FormatOption, MdfOption, OutputOption
+from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 
 
@@ -21,6 +22,7 @@ class Part(StrEnum):
 def command(
     format_: FormatOption = None,
     output: OutputOption = None,
+    force: ForceOption = False,
     mdf: MdfOption = None,
     part: Annotated[Part | None, typer.Option(help="Only this part.")] = None,
 ) -> None:
@@ -46,6 +48,7 @@ def command(
     from mdfconv.benchmark.stability import audit
     from mdfconv.benchmark.stability_finding import Finding
 
+    outputs = Outputs(table=output, force=force)
     rows = [asdict(finding) for finding in audit(mdf or (), part)]
     columns = [field.name for field in fields(Finding)]
-    write_table(columns, rows, format_, output, title="Hard cases: worst relative errors")
+    write_table(columns, rows, format_, outputs, title="Hard cases: worst relative errors")

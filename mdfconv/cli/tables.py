@@ -19,6 +19,8 @@ from mdfconv.output.records import Record, cell_text, csv_text, json_text, markd
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from mdfconv.cli.outputs import Outputs
+
 _PIPE_WIDTH = 160
 # Nobody reads more in a terminal, and Rich takes a millisecond a row.
 ROWS_SHOWN = 500
@@ -46,8 +48,9 @@ def write_table(
     columns: Sequence[str],
     rows: Sequence[Record],
     form: Format | None,
-    output: Path | None = None,
+    outputs: Outputs | None = None,
     *,
+    beside: Mapping[Path, bytes] | None = None,
     title: str = "",
     styles: Sequence[str] = (),
 ) -> None:
@@ -59,20 +62,28 @@ def write_table(
         Keys of the rows, in order: the headings.
     rows : sequence of mapping
         Cells: numbers, text, None for an empty one, tuples and lists of numbers or text.
-    form, output
+    form : Format or None
         As for `form_of`.
+    outputs : Outputs, optional
+        The files of the command, of which one may be that of the table.
+    beside : mapping of Path to bytes, optional
+        Its other files, written with that of the table or before it is printed.
     title : str
         Above a table on a terminal.
     styles : sequence of str
         Rich's style of each row of a table on a terminal.
     """
+    output = outputs.table if outputs else None
     form = form_of(form, output)
-    if output is not None:
+    if outputs:
         # Most calls write no file, and its imports would be a tenth of their start.
-        from mdfconv.output.files import file_bytes, write_files
+        from mdfconv.output.files import file_bytes
 
-        write_files({output: file_bytes(table_text(columns, rows, form))})
-    elif form is Format.table:
+        table = {output: file_bytes(table_text(columns, rows, form))} if output else {}
+        outputs.write({**(beside or {}), **table})
+    if output:
+        return
+    if form is Format.table:
         print_table(rich_table(columns, rows[:ROWS_SHOWN], title, styles))
         tell_rest(len(rows))
     else:

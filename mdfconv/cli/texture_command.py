@@ -12,6 +12,7 @@ from mdfconv.cli import completion
 from mdfconv.cli.options import (
     ExposureOption,
     FixedGammaOption,
+    ForceOption,
     MethodOption,
     MetricOption,
     PngOption,
@@ -19,7 +20,7 @@ from mdfconv.cli.options import (
     chosen_metric,
     fixed_gamma,
 )
-from mdfconv.cli.outputs import check_outputs, write_named
+from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import progress, tell
 
 
@@ -88,6 +89,7 @@ def command(
         typer.Option(metavar="N", min=1, help="Largest picture to decode; default 134217728."),
     ] = None,
     png: PngOption = None,
+    force: ForceOption = False,
 ) -> None:
     """Convert a roughness texture, texel by texel.
 
@@ -110,8 +112,7 @@ def command(
     from mdfconv.scene.texture import convert_texture_file
     from mdfconv.scene.texture_rule import TextureRule
 
-    if png:
-        check_outputs(png, output, inputs=[source_file])
+    outputs = Outputs(output, png, force=force, inputs=[source_file])
     rule = TextureRule(
         *with_specular(source, target, specular),
         method,
@@ -120,22 +121,26 @@ def command(
         log2_scale,
         fixed_gamma(gamma),
     )
-    report = convert_texture_file(
-        source_file,
-        output,
-        rule,
-        channel=channel,
-        depth=None if depth is Depth.keep else int(depth),
-        dither=dither,
-        lossy=lossy,
-        max_pixels=max_pixels,
-        progress=progress,
-    )
+    with outputs.staged() as files:
+        report = convert_texture_file(
+            source_file,
+            output,
+            rule,
+            channel=channel,
+            depth=None if depth is Depth.keep else int(depth),
+            dither=dither,
+            lossy=lossy,
+            max_pixels=max_pixels,
+            progress=progress,
+            files=files,
+        )
+        if png:
+            from mdfconv.scene.texture_figure import draw_histograms
+
+            files.add(png, draw_histograms(report, f"{source_file.name} → {output.name}"))
     for note in report.notes():
         tell(f"note: {note}")
     keeps = f"keeps the {report.keeps}" if report.keeps else "the same lobes"
     tell(f"wrote {output}: {report.target}, {keeps}")
     if png:
-        from mdfconv.scene.texture_figure import draw_histograms
-
-        write_named({png: draw_histograms(report, f"{source_file.name} → {output.name}")})
+        tell(f"wrote {png}")

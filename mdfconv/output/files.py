@@ -8,7 +8,7 @@ import os
 import shutil
 import signal
 import threading
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -18,6 +18,8 @@ from mdfconv.errors import MdfconvError
 
 # What commands call standard input.
 STANDARD_INPUT = "-"
+# Where open files have names, which may lead to a file, such as that of standard output.
+_OPEN_FILES = tuple(map(Path, ("/dev", "/dev/fd", "/proc/self/fd")))
 # What ends a process politely: it still puts its things away.
 _ENDS = ("SIGTERM", "SIGHUP")
 
@@ -28,8 +30,10 @@ def file_bytes(text: str) -> bytes:
 
 
 def is_stream(path: Path) -> bool:
-    """Return whether a path is there and neither a file nor a folder: a device or a pipe."""
-    return path.exists() and not path.is_file() and not path.is_dir()
+    """Return whether a path is there and no file of its own: a device, a pipe, an open file."""
+    if not path.exists() or path.is_dir():
+        return False
+    return path.parent in _OPEN_FILES or not path.is_file()
 
 
 def find_files(patterns: Sequence[str]) -> list[Path]:
@@ -58,24 +62,25 @@ def create_folder(folder: Path) -> None:
         raise MdfconvError(f"cannot create {folder}: {error.strerror}") from None
 
 
+def exists_refusal(path: Path) -> MdfconvError:
+    """Return the refusal to write over a file that nobody said to replace."""
+    return MdfconvError(f"{path} exists", "it can be replaced", argument="force")
+
+
 def write_files(
     contents: Mapping[Path, bytes],
     *,
     new: Collection[Path] = (),
     like: Mapping[Path, Path] | None = None,
 ) -> None:
-    """Write files whole or not at all: all beside their places first, then renamed.
-
-    A link stays one, and what is there and no file (a device, a pipe) is written to as it is.
-    Data are on the disk before a name points to them. If a name cannot be changed, those that
-    were are changed back.
+    """Write files whole or not at all, as `staged_files`.
 
     Parameters
     ----------
     contents : mapping of Path to bytes
         The files.
     new : collection of Path
-        Those that must not exist: one that does, at the last moment, is not written over.
+        Those that must not exist.
     like : mapping of Path to Path, optional
         Files whose permissions and owner others get; without one they are those of a new file,
         or of the file that is written over.
@@ -85,34 +90,52 @@ def write_files(
     MdfconvError
         If a place cannot be written; nothing is then changed.
     """
-    path = Path()
-    with _ends_raised(), _Staging() as staging:
+    with staged_files(new.__contains__) as files:
+        for path, content in contents.items():
+            files.add(path, content, (like or {}).get(path))
+
+
+@contextmanager
+def staged_files(is_new: Callable[[Path], bool]) -> Iterator[StagedFiles]:
+    """Take files beside their places, and give them their names when all are there.
+
+    A link stays one, and what is there and no file (a device, a pipe) is written to as it is.
+    Data are on the disk before a name points to them. If a name cannot be changed, those that
+    were are changed back.
+
+    Parameters
+    ----------
+    is_new : callable
+        Whether a file must not exist: one that does, at the last moment, is not written over.
+
+    Raises
+    ------
+    MdfconvError
+        If a place cannot be written; nothing is then changed.
+    """
+    with _ends_raised(), StagedFiles() as files:
         try:
-            for path, content in contents.items():
-                if path.is_dir():
-                    raise IsADirectoryError(errno.EISDIR, "is a directory")
-                if not is_stream(path):
-                    staging.stage(path, content, (like or {}).get(path, path))
-            for path in filter(is_stream, contents):
-                path.write_bytes(contents[path])
-            for path in staging.paths:
-                staging.place(path, new=path in new)
-            staging.keep()
+            yield files
+            files.place(is_new)
         except FileExistsError:
-            raise MdfconvError(f"will not write {path}: it exists") from None
+            raise exists_refusal(files.current) from None
         except OSError as error:
-            raise MdfconvError(f"cannot write {path}: {error.strerror}") from None
+            reason = error.strerror or (str(error).strip().splitlines() or ["unknown fault"])[0]
+            raise MdfconvError(f"cannot write {files.current}: {reason}") from None
 
 
-class _Staging:
-    """Files beside their places; on leaving, all is as before unless it is to be kept."""
+class StagedFiles:
+    """Files beside their places; on leaving, all is as before unless they were placed."""
 
     def __init__(self) -> None:
+        # The one that is at work, for messages.
+        self.current = Path()
         self._staged: dict[Path, Path] = {}
+        self._like: dict[Path, Path] = {}
         # Of each place that was changed the file that was there, under another name; None for none.
         self._before: list[tuple[Path, Path | None]] = []
 
-    def __enter__(self) -> _Staging:
+    def __enter__(self) -> StagedFiles:
         return self
 
     def __exit__(self, *problem: Any) -> None:
@@ -127,24 +150,41 @@ class _Staging:
         for staged in self._staged.values():
             staged.unlink(missing_ok=True)
 
-    @property
-    def paths(self) -> list[Path]:
-        """The paths that are staged."""
-        return list(self._staged)
+    def add(self, path: Path, content: bytes, like: Path | None = None) -> None:
+        """Add a file, with the permissions and the owner of another one."""
+        self._like[path] = like or path
+        self.fill(path).write_bytes(content)
 
-    def stage(self, path: Path, content: bytes, like: Path) -> None:
-        """Write a file beside its place, on the disk."""
-        place = path.resolve()
-        with NamedTemporaryFile(dir=place.parent, prefix=f".{place.name}.", delete=False) as file:
+    def fill(self, path: Path) -> Path:
+        """Add a file that is empty; return where it is, for others to write to."""
+        self.current = path
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        folder = None if is_stream(path) else path.resolve().parent
+        with NamedTemporaryFile(dir=folder, prefix=".mdfconv-", delete=False) as file:
             self._staged[path] = Path(file.name)
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        _give_permissions(Path(file.name), like)
+        return self._staged[path]
 
-    def place(self, path: Path, *, new: bool) -> None:
-        """Let the name point to the staged file."""
-        place, staged = path.resolve(), self._staged[path]
+    def place(self, is_new: Callable[[Path], bool]) -> None:
+        """Let the names point to the files."""
+        files = {path: staged for path, staged in self._staged.items() if not is_stream(path)}
+        for self.current, staged in files.items():
+            with staged.open("rb+") as file:
+                os.fsync(file.fileno())
+            _give_permissions(staged, self._like.get(self.current, self.current))
+        for path in filter(is_stream, self._staged):
+            self.current = path
+            # What a shell appends standard output to is not cut off.
+            with path.open("ab") as stream:
+                stream.write(self._staged[path].read_bytes())
+        for self.current, staged in files.items():
+            self._name(self.current.resolve(), staged, new=is_new(self.current))
+        for _, old in self._before:
+            if old is not None:
+                old.unlink(missing_ok=True)
+        self._before.clear()
+
+    def _name(self, place: Path, staged: Path, *, new: bool) -> None:
         if new:
             _link(staged, place)
             self._before.append((place, None))
@@ -155,13 +195,6 @@ class _Staging:
             _link(place, old)
         self._before.append((place, old))
         os.replace(staged, place)
-
-    def keep(self) -> None:
-        """Forget what was there before."""
-        for _, old in self._before:
-            if old is not None:
-                old.unlink(missing_ok=True)
-        self._before.clear()
 
 
 def _link(source: Path, target: Path) -> None:

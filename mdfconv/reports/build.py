@@ -1,19 +1,18 @@
 """The report folder: every table and figure of the project, and the index to them.
 
-A new artefact is a function that returns an `Artefact`, and one entry in `_ARTEFACTS`.
+A new artefact is a function that returns an `Artefact`, and one entry in `_ARTEFACTS`
+with the names of its files.
 """
 
 from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
 from typing import TypeAlias
 
-from mdfconv.errors import MdfconvError
-from mdfconv.output.files import file_bytes, write_files
+from mdfconv.output.files import file_bytes
 from mdfconv.output.records import markdown_text
 from mdfconv.reports import paper_pages
 from mdfconv.reports.artefact import Artefact
@@ -27,21 +26,28 @@ from mdfconv.reports.stability_page import stability_page
 
 _Make: TypeAlias = Callable[[], Artefact]
 
-_ARTEFACTS: tuple[_Make, ...] = (
-    paper_pages.table2,
-    paper_pages.other_metrics,
-    paper_pages.closed_forms,
-    paper_pages.error_figures,
-    paper_pages.pictures,
-    interactive_page,
-    method_page,
-    lights_page,
-    importer_page,
-    furnace_page,
-    fresnel_page,
-    stability_page,
-)
+# With the names of their files, so that one that is there is found before minutes of work.
+_ARTEFACTS: Mapping[_Make, tuple[str, ...]] = {
+    paper_pages.table2: ("table2.csv", "table2.md"),
+    paper_pages.other_metrics: tuple(
+        f"table2-{metric}.{end}"
+        for metric in ("energy", "display", "environment")
+        for end in ("csv", "md")
+    ),
+    paper_pages.closed_forms: ("closed-forms.csv", "closed-forms.md"),
+    paper_pages.error_figures: ("fig1.png", "fig1b.csv", "fig2.png", "fig2b.csv", "errors.md"),
+    paper_pages.pictures: ("fig4.png", "fig4.csv", "fig5.png", "fig5.csv", "pictures.md"),
+    interactive_page: ("comparison.html",),
+    method_page: ("methods.csv", "methods.md"),
+    lights_page: ("lights.md", "lights.csv", "lights-constants.csv", "lights.png"),
+    importer_page: ("importers.csv", "importers.md", "importers.png"),
+    furnace_page: ("furnace.csv", "furnace.md", "furnace.png"),
+    fresnel_page: ("fresnel.csv", "fresnel.md", "fresnel.png"),
+    stability_page: ("stability.csv", "stability.md"),
+}
 COUNT = len(_ARTEFACTS)
+INDEX = "README.md"
+FILES = (*(name for names in _ARTEFACTS.values() for name in names), INDEX)
 # They are begun first, so that no process ends long after the others.
 _LONGEST = (furnace_page, stability_page, method_page)
 # Neither times nor a browser's picture can be reproduced: these are only listed here.
@@ -62,43 +68,22 @@ _MADE_ELSEWHERE = (
 ELSEWHERE = tuple(name for artefact in _MADE_ELSEWHERE for name in artefact.files)
 
 
-def build(folder: Path, processes: int | None = None) -> Iterator[Artefact]:
-    """Write the report into a folder, yielding each artefact as it is written.
+def build(processes: int | None = None) -> Iterator[Artefact]:
+    """Yield the artefacts in the order of the index.
 
     Parameters
     ----------
-    folder : Path
-        Created if its parent exists.
     processes : int, optional
         How many make artefacts at a time; as many as there are processors by default. With 1
         all are made in the caller's own.
-
-    Raises
-    ------
-    MdfconvError
-        If the folder cannot be written.
     """
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise MdfconvError(f"cannot create {folder}: {error.strerror}") from None
-    artefacts = []
-    for artefact in _made(processes or min(os.cpu_count() or 1, COUNT)):
-        write_files({folder / name: content for name, content in artefact.files.items()})
-        artefacts.append(artefact)
-        yield artefact
-    artefacts += [other for other in _MADE_ELSEWHERE if (folder / min(other.files)).exists()]
-    write_files({folder / "README.md": file_bytes(_index(artefacts))})
-
-
-def _made(processes: int) -> Iterator[Artefact]:
-    """Yield the artefacts in the order of the index."""
-    if processes == 1:
+    count = processes or min(os.cpu_count() or 1, COUNT)
+    if count == 1:
         yield from (make() for make in _ARTEFACTS)
         return
     # An interrupt from a terminal reaches every process: those of the pool end at once, unheard.
     pool = ProcessPoolExecutor(
-        processes, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_DFL)
+        count, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_DFL)
     )
     try:
         begun = {make: pool.submit(make) for make in dict.fromkeys([*_LONGEST, *_ARTEFACTS])}
@@ -106,6 +91,13 @@ def _made(processes: int) -> Iterator[Artefact]:
             yield begun[make].result()
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def report_files(artefacts: Sequence[Artefact], present: Collection[str]) -> dict[str, bytes]:
+    """Return the files of the report by their names; the index lists what is there, too."""
+    files = {name: content for each in artefacts for name, content in each.files.items()}
+    there = [other for other in _MADE_ELSEWHERE if set(other.files) <= set(present)]
+    return {**files, INDEX: file_bytes(_index([*artefacts, *there]))}
 
 
 def _index(artefacts: Sequence[Artefact]) -> str:

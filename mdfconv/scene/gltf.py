@@ -132,6 +132,7 @@ def convert_gltf(
         materials=tuple(sorted(materials, key=attrgetter("index"))),
         problems=tuple((f"materials[{at}]", problems[at]) for at in sorted(problems)),
         files=changes.files,
+        inputs=changes.inputs,
     )
 
 

@@ -16,7 +16,7 @@ from mdfconv.errors import MdfconvError
 from mdfconv.scene.gltf_container import Container, aligned
 from mdfconv.scene.gltf_document import GltfDocument
 from mdfconv.scene.json_edit import JsonText
-from mdfconv.scene.material_files import read_file
+from mdfconv.scene.material_files import free_name, read_file
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 _DATA = re.compile(r"data:([^,]*),", re.IGNORECASE)
@@ -90,7 +90,7 @@ class GltfImages:
         )
         self.files: dict[Path, bytes] = {}
         self.appended = b""
-        self._read: dict[str, bytes] = {}
+        self._read: dict[Path, bytes] = {}
         self._new_images: list[str] = []
         self._new_views: list[str] = []
 
@@ -140,6 +140,11 @@ class GltfImages:
             length = aligned(size) + len(self.appended)
             self._document.json.set_members(self._buffers[0].start, {"byteLength": str(length)})
 
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The files that were read."""
+        return tuple(self._read)
+
     @cached_property
     def _views_used(self) -> list[Any]:
         """What the document names of its buffer views, each as often as it does."""
@@ -181,11 +186,7 @@ class GltfImages:
         entry = self.images[image].value
         stem = Path(unquote(entry["uri"])).stem if "uri" in entry else entry.get("name")
         stem = _UNSAFE.sub("_", stem) if isinstance(stem, str) and stem else f"image{image}"
-        path, count = self._folders.output / f"{stem}_{self._ending}.png", 1
-        while path in self.files:
-            count += 1
-            path = path.with_name(f"{stem}_{self._ending}_{count}.png")
-        _check_free(path)
+        path = free_name(self._folders.output, f"{stem}_{self._ending}", ".png", self.files)
         self.files[path] = content
         return json.dumps(quote(path.name))
 
@@ -197,14 +198,15 @@ class GltfImages:
             return _decoded(uri[inside.end() :], inside[1])
         if _SCHEME.match(uri) or uri.startswith("//"):
             raise MdfconvError(f"names {uri}, which is no file beside it")
-        if uri not in self._read:
+        path = self._folders.source / unquote(uri)
+        if path not in self._read:
             try:
-                self._read[uri] = read_file(self._folders.source / unquote(uri))
+                self._read[path] = read_file(path)
             except MdfconvError:
                 raise
             except ValueError:
                 raise MdfconvError("names a file by what is no name of one") from None
-        return self._read[uri]
+        return self._read[path]
 
     def _from_view(self, at: int) -> bytes:
         view = self._views[at].value
@@ -228,16 +230,6 @@ class GltfImages:
 def _kind(entry: dict[str, Any]) -> dict[str, str]:
     """Return what to set for an image that says to be no PNG."""
     return {"mimeType": f'"{_MIME}"'} if entry.get("mimeType", _MIME) != _MIME else {}
-
-
-def _check_free(path: Path) -> None:
-    """Refuse a new file that is there."""
-    try:
-        exists = path.exists()
-    except (OSError, ValueError):
-        raise MdfconvError(f"cannot write {path}") from None
-    if exists:
-        raise MdfconvError(f"will not write {path}: it exists")
 
 
 def _decoded(payload: str, kind: str) -> bytes:

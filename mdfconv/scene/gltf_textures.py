@@ -38,6 +38,8 @@ class TextureChanges:
         and why the others are left as they are.
     files : dict
         New files.
+    inputs : tuple of Path
+        The files that were read.
     appended : bytes
         What is added to the binary chunk.
     """
@@ -45,6 +47,7 @@ class TextureChanges:
     notes: dict[int, tuple[str, ...]] = field(default_factory=dict)
     problems: dict[int, str] = field(default_factory=dict)
     files: dict[Path, bytes] = field(default_factory=dict)
+    inputs: tuple[Path, ...] = ()
     appended: bytes = b""
 
 
@@ -103,7 +106,7 @@ def convert_textures(
     for version, texts in notes.items():
         for at in changes.notes.keys() & versions[version]:
             changes.notes[at] += tuple(texts)
-    changes.files, changes.appended = images.files, images.appended
+    changes.files, changes.inputs, changes.appended = images.files, images.inputs, images.appended
     return changes
 
 

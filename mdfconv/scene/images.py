@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import struct
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
 
 import numpy as np
@@ -110,8 +108,6 @@ def check_files(source: Path, output: Path, *, lossy: bool = False) -> tuple[For
         )
     if output == source or (output.exists() and output.samefile(source)):
         raise MdfconvError(f"{output} is the same file as {source}", "write to another one")
-    if output.is_dir():
-        raise MdfconvError(f"cannot write {output}: Is a directory")
     return source_form, output_form
 
 
@@ -374,48 +370,47 @@ def check_output(picture: Picture, form: Form, dtype: np.dtype[Any]) -> None:
 
 @contextmanager
 def written(
-    output: Path, form: Form, picture: Picture, dtype: np.dtype[Any]
+    beside: Path, form: Form, picture: Picture, dtype: np.dtype[Any]
 ) -> Iterator[Callable[[NDArray[Any]], None]]:
-    """Give what takes the rows of a converted picture, and make the file when all are there.
+    """Give what takes the rows of a converted picture, for a file that is there and empty.
 
     Raises
     ------
-    MdfconvError
-        If it cannot be written; the output is then as it was.
+    OSError
+        If it cannot be written.
     """
     import OpenImageIO
 
-    with _staged(output) as beside:
-        with reading(picture.path):  # whose texts may be none
-            spec = _output_spec(picture, form, dtype)
-        file: Any = OpenImageIO.ImageOutput.create(_FORMATS[form])
-        if not file.open(str(beside), spec):
-            raise OSError(file.geterror())
-        top = spec.y
+    with reading(picture.path):  # whose texts may be none
+        spec = _output_spec(picture, form, dtype)
+    file: Any = OpenImageIO.ImageOutput.create(_FORMATS[form])
+    if not file.open(str(beside), spec):
+        raise OSError(file.geterror())
+    top = spec.y
 
-        def write(rows: NDArray[Any]) -> None:
-            nonlocal top
-            place = top, top + len(rows)
-            if spec.tile_width:
-                columns = spec.x, spec.x + spec.width
-                done = file.write_tiles(*columns, *place, 0, 1, rows)
-            else:
-                done = file.write_scanlines(*place, 0, rows)
-            if not done:
-                raise OSError(file.geterror())
-            top += len(rows)
-
-        try:
-            yield write
-        finally:
-            with quiet_streams():  # libpng misses what has not been written
-                closed = file.close()
-        if not closed:
+    def write(rows: NDArray[Any]) -> None:
+        nonlocal top
+        place = top, top + len(rows)
+        if spec.tile_width:
+            columns = spec.x, spec.x + spec.width
+            done = file.write_tiles(*columns, *place, 0, 1, rows)
+        else:
+            done = file.write_scanlines(*place, 0, rows)
+        if not done:
             raise OSError(file.geterror())
-        if form is Form.png:
-            replace_chunks(beside, _png_chunks(picture))
-        if form is Form.tga:
-            check_tga(beside, spec.image_bytes())
+        top += len(rows)
+
+    try:
+        yield write
+    finally:
+        with quiet_streams():  # libpng misses what has not been written
+            closed = file.close()
+    if not closed:
+        raise OSError(file.geterror())
+    if form is Form.png:
+        replace_chunks(beside, _png_chunks(picture))
+    if form is Form.tga:
+        check_tga(beside, spec.image_bytes())
 
 
 def _output_spec(picture: Picture, form: Form, dtype: np.dtype[Any]) -> Any:
@@ -470,24 +465,3 @@ def _png_chunks(picture: Picture) -> bytes:
         sides = round(x * factor), round(y * factor)
         chunks += png_chunk(b"pHYs", struct.pack(">IIB", *sides, unit != "none"))
     return chunks
-
-
-@contextmanager
-def _staged(output: Path) -> Iterator[Path]:
-    """Give a file beside the output, and rename it to it when all went well."""
-    mask = os.umask(0)
-    os.umask(mask)
-    beside = None
-    try:
-        with NamedTemporaryFile(dir=output.parent, prefix=".mdfconv-", delete=False) as file:
-            beside = Path(file.name)
-        yield beside
-        # A temporary file is private; give it the permissions of any other new file.
-        beside.chmod(0o666 & ~mask)
-        beside.replace(output)
-    except OSError as error:
-        reason = error.strerror or (str(error).strip().splitlines() or ["unknown fault"])[0]
-        raise MdfconvError(f"cannot write {output}: {reason}") from None
-    finally:
-        if beside:
-            beside.unlink(missing_ok=True)

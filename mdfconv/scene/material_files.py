@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -45,8 +45,7 @@ def choose_outputs(
     Raises
     ------
     MdfconvError
-        If the results are to go nowhere or to two places, several to one file, or one over a
-        file that would be lost.
+        If the results are to go nowhere or to two places.
     """
     if in_place == (output is not None):
         raise MdfconvError(
@@ -61,31 +60,21 @@ def choose_outputs(
     if output.endswith(("/", os.sep)):
         create_folder(path)
     if path.is_dir():
-        destinations = [Destination(file, path / file.name) for file in files]
-    elif len(files) > 1:
+        return [Destination(file, path / file.name) for file in files]
+    if len(files) > 1:
         raise MdfconvError(f"{len(files)} files need a folder: {output} is not one")
-    elif output == "-":
+    if output == "-":
         raise MdfconvError(f"cannot write {output}: it is not a file or an existing folder")
-    else:
-        destinations = [Destination(files[0], path)]
-    outputs = [destination.output for destination in destinations]
-    for destination in destinations:
-        _check_new(destination)
-        if outputs.count(destination.output) > 1:
-            raise MdfconvError(f"two files would both be written to {destination.output}")
-    return destinations
+    return [Destination(files[0], path)]
 
 
-def _check_new(destination: Destination) -> None:
-    """Refuse an output that exists."""
-    output = destination.output
-    if not output.exists():
-        return
-    if os.path.samefile(output, destination.source):
-        raise MdfconvError(
-            f"will not write {output}: it is the input", "convert it in place", argument="in_place"
-        )
-    raise MdfconvError(f"will not write {output}: it exists")
+def free_name(folder: Path, stem: str, suffix: str, taken: Container[Path]) -> Path:
+    """Return a path in a folder that is none of those taken: of ``wood`` also ``wood_2``."""
+    path, count = folder / f"{stem}{suffix}", 1
+    while path in taken:
+        count += 1
+        path = folder / f"{stem}_{count}{suffix}"
+    return path
 
 
 def _free_backup(file: Path) -> Path:
@@ -110,11 +99,14 @@ class FileConversion:
         wrong with it.
     files : mapping of Path to bytes
         What goes beside the result, such as textures.
+    inputs : sequence of Path
+        The files that those were made from.
     """
 
     data: bytes
     problems: tuple[tuple[int | str, str], ...] = ()
     files: Mapping[Path, bytes] = field(default_factory=dict)
+    inputs: Sequence[Path] = ()
 
 
 def read_file(path: Path) -> bytes:
@@ -132,7 +124,7 @@ def read_file(path: Path) -> bytes:
 
 
 def write_conversions(
-    converted: Sequence[tuple[Destination, bytes, FileConversion]],
+    converted: Sequence[tuple[Destination, bytes, FileConversion]], *, force: bool = False
 ) -> list[Destination]:
     """Write all conversions and what goes beside them, backups first, or nothing.
 
@@ -142,6 +134,8 @@ def write_conversions(
     ----------
     converted : sequence of (Destination, bytes, FileConversion)
         For each file where it goes, its original and its conversion.
+    force : bool
+        Whether files that exist are replaced; backups never are.
 
     Returns
     -------
@@ -167,9 +161,10 @@ def write_conversions(
             contents[destination.backup] = original
             backups[destination.backup] = destination.source
             new.add(destination.backup)
-        else:
+        elif not force:
             new.add(destination.output)
-        new |= set(conversion.files)
+        if not force:
+            new |= set(conversion.files)
     for destination, _, conversion in changed:
         for path, data in {destination.output: conversion.data, **conversion.files}.items():
             if contents.setdefault(path, data) != data:

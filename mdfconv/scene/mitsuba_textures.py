@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
-from mdfconv.scene.material_files import read_file
+from mdfconv.scene.material_files import free_name, read_file
 from mdfconv.scene.texture_bytes import convert_texture_bytes
 from mdfconv.scene.texture_rule import TextureRule
 
@@ -33,6 +32,8 @@ class BitmapConverter:
     def __call__(self, file: str, distribution: str) -> str:
         """Convert a bitmap; return its new name: ``wood.png`` becomes ``wood_ggx.png``.
 
+        Another of that name becomes ``wood_ggx_2.png``.
+
         Parameters
         ----------
         file : str
@@ -43,19 +44,23 @@ class BitmapConverter:
         Raises
         ------
         MdfconvError
-            If it cannot be read or converted, or a file of the new name is there.
+            If it cannot be read or converted.
         """
         # Scenes from Windows separate folders by backslashes.
         source = self._scene.parent / file.replace("\\", "/")
         key = source, distribution
         if key not in self._done:
-            target = self._output.parent / f"{source.stem}_{self._target}{source.suffix}"
-            if target.exists() or target in self._files:
-                raise MdfconvError(f"will not write {target}: it exists")
+            stem = f"{source.stem}_{self._target}"
+            target = free_name(self._output.parent, stem, source.suffix, self._files)
             rule = TextureRule(distribution, self._target, metric=self._metric)
             self._files[target] = convert_texture_bytes(read_file(source), source.suffix, rule)
             self._done[key] = target.name
         return self._done[key]
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The bitmaps that were converted."""
+        return tuple(source for source, _ in self._done)
 
     def files(self, names: set[str]) -> dict[Path, bytes]:
         """Return the converted files of some names."""

@@ -3,15 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
-from mdfconv.scene.material_files import read_file
+from mdfconv.scene.material_files import free_name, read_file
 from mdfconv.scene.mtl import TextureStatement
 from mdfconv.scene.shininess import ROUGHNESS, SHININESS
 from mdfconv.scene.texture_bytes import convert_texture_bytes
 from mdfconv.scene.texture_rule import TextureRule
+
+
+@dataclass
+class MtlTextures:
+    """What became of the textures of a library.
+
+    Parameters
+    ----------
+    names : dict
+        From the files named to the new ones: ``wood.png`` becomes ``wood_Pr.png``, another of that
+        name ``wood_Pr_2.png``.
+    files : dict
+        The new files.
+    inputs : tuple of Path
+        The files that those were made from.
+    problems : list of (int, str)
+        For each texture that cannot be converted its line and the reason.
+    """
+
+    names: dict[str, str] = field(default_factory=dict)
+    files: dict[Path, bytes] = field(default_factory=dict)
+    inputs: tuple[Path, ...] = ()
+    problems: list[tuple[int, str]] = field(default_factory=list)
 
 
 def convert_textures(
@@ -21,7 +45,7 @@ def convert_textures(
     metric: str | Metric,
     exponent_max: float,
     advance: Callable[[int], None],
-) -> tuple[dict[str, str], dict[Path, bytes], list[tuple[int, str]]]:
+) -> MtlTextures:
     """Convert the textures that a library names, for the folder of its conversion.
 
     Parameters
@@ -37,14 +61,6 @@ def convert_textures(
     advance : callable
         Called with 1 after each statement.
 
-    Returns
-    -------
-    names : dict
-        From the files named to the new ones: ``wood.png`` becomes ``wood_Pr.png``.
-    files : dict
-        The new files.
-    problems : list of (int, str)
-        For each texture that cannot be converted its line and the reason.
     """
     rule = TextureRule(
         f"{SHININESS}:exponent",
@@ -53,22 +69,19 @@ def convert_textures(
         exponent_max=exponent_max,
     )
     rule.endpoints()
-    names: dict[str, str] = {}
-    done: dict[Path, str] = {}
-    files: dict[Path, bytes] = {}
-    problems = []
+    found = MtlTextures()
+    done: dict[Path, Path] = {}
     for texture in textures:
         # Libraries from Windows separate folders by backslashes.
         source = library.parent / texture.file.replace("\\", "/")
-        target = output.parent / f"{source.stem}_Pr{source.suffix}"
         try:
             if source not in done:
-                if target.exists():
-                    raise MdfconvError(f"will not write {target}: it exists")
-                files[target] = convert_texture_bytes(read_file(source), source.suffix, rule)
-                done[source] = target.name
-            names[texture.file] = done[source]
+                target = free_name(output.parent, f"{source.stem}_Pr", source.suffix, found.files)
+                found.files[target] = convert_texture_bytes(read_file(source), source.suffix, rule)
+                done[source] = target
+            found.names[texture.file] = done[source].name
         except MdfconvError as error:
-            problems.append((texture.line, str(error)))
+            found.problems.append((texture.line, str(error)))
         advance(1)
-    return names, files, problems
+    found.inputs = tuple(done)
+    return found

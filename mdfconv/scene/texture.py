@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mdfconv.errors import MdfconvError, MdfconvWarning
+from mdfconv.output.files import StagedFiles, staged_files
 from mdfconv.scene.image_channels import find_channels
 from mdfconv.scene.images import Form, check_files, check_output, open_picture, written
 from mdfconv.scene.texture_map import BLOCK, TexelMap, TextureReport
@@ -89,6 +90,7 @@ def convert_texture_file(
     lossy: bool = False,
     max_pixels: int | None = None,
     progress: Progress | None = None,
+    files: StagedFiles | None = None,
 ) -> TextureReport:
     """Convert a texture in a PNG, TIFF, TGA or OpenEXR file, and write it to another.
 
@@ -117,6 +119,8 @@ def convert_texture_file(
         The largest picture that is decoded; 2²⁷ (134217728) if not given.
     progress : callable, optional
         ``progress(description, total)``, a context that yields what advances by so many rows.
+    files : StagedFiles, optional
+        What takes the output, to be placed together with other files.
 
     Returns
     -------
@@ -132,20 +136,20 @@ def convert_texture_file(
     source, output = Path(source), Path(output)
     ValueConverter(rule)  # names are wrong more often than files
     source_form, form = check_files(source, output, lossy=lossy)
-    with open_picture(
-        source,
-        source_form,
-        lossy=lossy,
-        max_pixels=max_pixels,
-        upright=form not in (Form.tiff, Form.exr),
-    ) as picture:
+    upright = form not in (Form.tiff, Form.exr)
+    with (
+        nullcontext(files) if files else staged_files(lambda _: False) as taking,
+        open_picture(
+            source, source_form, lossy=lossy, max_pixels=max_pixels, upright=upright
+        ) as picture,
+    ):
         channels = find_channels(source, picture.names, channel)
         dtype = picture.dtype_of(channels)
         width = picture.width if dither else None
         convert = TexelMap(rule, dtype, depth, width, channels=len(channels))
         check_output(picture, form, convert.dtype)
         with (
-            written(output, form, picture, convert.dtype) as write,
+            written(taking.fill(output), form, picture, convert.dtype) as write,
             progress("rows", picture.height) if progress else nullcontext(_ignore) as advance,
         ):
             for block in picture.blocks(BLOCK):

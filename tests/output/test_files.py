@@ -76,7 +76,7 @@ def test_a_failure_at_any_step_changes_nothing(tmp_path, monkeypatch, call, turn
 
 def test_what_must_be_new_is_not_written_over(tmp_path):
     (tmp_path / "b").write_bytes(b"old")
-    with pytest.raises(MdfconvError, match=r"will not write .*b: it exists"):
+    with pytest.raises(MdfconvError, match=r"b exists; it can be replaced"):
         write_files(
             {tmp_path / "a": b"new", tmp_path / "b": b"new"}, new=[tmp_path / "a", tmp_path / "b"]
         )

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from mdfconv.errors import MdfconvError
 from mdfconv.reports import build as report
-from mdfconv.reports.build import ELSEWHERE, build
-from mdfconv.reports.paper_pages import other_metrics, table2
+from mdfconv.reports.build import ELSEWHERE, FILES, build, report_files
+from mdfconv.reports.paper_pages import closed_forms, other_metrics, table2
 from tests.cli.runner import run
 
 REPORTS = Path(__file__).parents[2] / "reports"
@@ -26,14 +26,14 @@ def folder(tmp_path_factory):
         shutil.copy(REPORTS / name, path)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"a picture"))
-        for _ in build(path, processes=1):
-            pass
+        for name, content in report_files(list(build(processes=1)), ELSEWHERE).items():
+            (path / name).write_bytes(content)
     return path
 
 
 def test_report_is_what_the_code_makes(folder):
     names = {path.name for path in folder.iterdir()}
-    assert names == {path.name for path in REPORTS.iterdir()}
+    assert names == {path.name for path in REPORTS.iterdir()} == {*FILES, *ELSEWHERE}
     for path in sorted(folder.iterdir()):
         if path.suffix in (".csv", ".md"):
             # The orders of magnitude of rounding errors depend on the processor.
@@ -82,21 +82,21 @@ def refuse():
 
 
 @pytest.mark.parametrize("processes", [1, 2])
-def test_an_artefact_that_cannot_be(processes, tmp_path, monkeypatch):
+def test_an_artefact_that_cannot_be(processes, monkeypatch):
     monkeypatch.setattr(report, "_LONGEST", ())
-    monkeypatch.setattr(report, "_ARTEFACTS", (table2, refuse, table2))
-    written = build(tmp_path, processes)
-    assert set(next(written).files) == {path.name for path in tmp_path.iterdir()}
+    monkeypatch.setattr(report, "_ARTEFACTS", (table2, refuse, closed_forms))
+    made = build(processes)
+    assert "table2.csv" in next(made).files
     with pytest.raises(MdfconvError, match="no such light; there are two") as caught:
-        next(written)
+        next(made)
     assert caught.value.argument == "light"
     assert multiprocessing.active_children() == []
 
 
-def test_processes_take_turns_and_keep_the_order(tmp_path, monkeypatch):
+def test_processes_take_turns_and_keep_the_order(monkeypatch):
     monkeypatch.setattr(report, "_LONGEST", (table2,))
     monkeypatch.setattr(report, "_ARTEFACTS", (other_metrics, table2))
-    names = [next(iter(artefact.files)) for artefact in build(tmp_path, 2)]
-    assert names == ["table2-energy.csv", "table2.csv"]
-    index = (tmp_path / "README.md").read_text()
+    made = list(build(2))
+    assert [next(iter(artefact.files)) for artefact in made] == ["table2-energy.csv", "table2.csv"]
+    index = report_files(made, [])["README.md"].decode()
     assert index.index("table2-energy.csv") < index.index("[table2.csv]")

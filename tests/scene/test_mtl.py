@@ -240,7 +240,7 @@ def test_in_place_twice_at_once_loses_nothing(tmp_path, monkeypatch):
     with pytest.raises(mdfconv.MdfconvError, match="it has changed since it was read"):
         write_conversions([(both[1], SOURCE, conversion)])
     library.write_bytes(SOURCE)
-    with pytest.raises(mdfconv.MdfconvError, match=r"will not write .*a.mtl.bak: it exists"):
+    with pytest.raises(mdfconv.MdfconvError, match=r"a.mtl.bak exists"):
         write_conversions([(both[1], SOURCE, conversion)])
     assert library.read_bytes() == SOURCE
     assert (tmp_path / "a.mtl.bak").read_bytes() == SOURCE
@@ -276,10 +276,10 @@ def test_a_bad_statement_turns_the_status_to_1(tmp_path):
     [
         (["a.mtl"], "in place, or into another file or folder"),
         (["a.mtl", "-o", "x.mtl", "--in-place"], "in place, or into another file or folder"),
-        (["a.mtl", "-o", "a.mtl"], "it is the input"),
-        (["a.mtl", "-o", "b.mtl"], "will not write b.mtl: it exists"),
+        (["a.mtl", "-o", "a.mtl"], "a.mtl is the input"),
+        (["a.mtl", "-o", "b.mtl"], "b.mtl exists; it can be replaced (--force)"),
         (["a.mtl", "b.mtl", "-o", "x.mtl"], "2 files need a folder"),
-        (["a.mtl", "sub/a.mtl", "-o", "new"], "would both be written to new/a.mtl"),
+        (["a.mtl", "sub/a.mtl", "-o", "new"], "new/a.mtl is named for two results"),
         (["none.mtl", "-o", "x.mtl"], "cannot read none.mtl"),
         (["*.none", "-o", "x.mtl"], "cannot read *.none"),
         (["sub", "-o", "x.mtl"], "cannot read sub: Is a directory"),
@@ -380,3 +380,52 @@ def test_textures_are_converted_beside_the_result(tmp_path):
     assert np.abs(got[1:] / 255 - exact).max() <= 0.5 / 255 + 1e-9
     read_back = read((tmp_path / "out" / "a.mtl").read_bytes(), tmp_path)
     assert read_back["a"]["roughness_texname"] == "shine_Pr.png"
+
+
+def test_textures_of_one_name_are_not_mixed_up(tmp_path):
+    for folder, texel in (("a", 50), ("b", 200)):
+        (tmp_path / folder).mkdir()
+        Image.fromarray(np.full((1, 1), texel, np.uint8)).save(tmp_path / folder / "x.png")
+    lines = "newmtl {0}\nNs 50\nmap_Ns {0}/x.png\n"
+    (tmp_path / "a.mtl").write_text(lines.format("a") + lines.format("b"))
+    assert run("mtl", "a.mtl", "-o", "b.mtl", "--textures", cwd=tmp_path)[0] == 0
+    read_back = read((tmp_path / "b.mtl").read_bytes(), tmp_path)
+    for folder, texel in (("a", 50), ("b", 200)):
+        new = np.asarray(Image.open(tmp_path / read_back[folder]["roughness_texname"]))[0, 0]
+        exact = mdfconv.convert(
+            texel / 255 * 1000, "blinn-phong", "ggx:roughness", "fit", metric="environment"
+        )
+        assert abs(new / 255 - exact) <= 0.5 / 255 + 1e-9
+
+
+def test_textures_of_one_name_from_two_libraries_are_refused(tmp_path):
+    for folder, texel in (("a", 50), ("b", 200)):
+        (tmp_path / folder).mkdir()
+        Image.fromarray(np.full((1, 1), texel, np.uint8)).save(tmp_path / folder / "x.png")
+        (tmp_path / folder / f"{folder}.mtl").write_text("newmtl a\nNs 50\nmap_Ns x.png\n")
+    (tmp_path / "out").mkdir()
+    status, out, err = run("mtl", "*/*.mtl", "-o", "out", "--textures", cwd=tmp_path)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "two results would both be written to out/x_Pr.png" in err
+    assert not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_textures_are_not_written_over_by_accident(tmp_path, force):
+    texture = tmp_path / "x_Pr.png"
+    Image.fromarray(np.full((1, 1), 50, np.uint8)).save(tmp_path / "x.png")
+    texture.write_bytes(b"old")
+    (tmp_path / "a.mtl").write_text("newmtl a\nmap_Ns x.png\n")
+    status, _, err = run("mtl", "a.mtl", "-o", "b.mtl", "--textures", *force, cwd=tmp_path)
+    assert status == (0 if force else 2)
+    assert (texture.read_bytes() == b"old") == (not force)
+    assert (tmp_path / "b.mtl").exists() == bool(force)
+    # One that was read is never written over.
+    texture.unlink()
+    Image.fromarray(np.full((1, 1), 200, np.uint8)).save(texture)
+    before = texture.read_bytes()
+    (tmp_path / "a.mtl").write_text("newmtl a\nmap_Ns x.png\nnewmtl b\nmap_Ns x_Pr.png\n")
+    status, _, err = run("mtl", "a.mtl", "-o", "c.mtl", "--textures", "--force", cwd=tmp_path)
+    assert status == 2
+    assert "x_Pr.png is the input" in err
+    assert texture.read_bytes() == before

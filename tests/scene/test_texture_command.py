@@ -78,7 +78,7 @@ def test_grey_stored_as_colour(texture):
         ({}, ("--png", "nowhere/h.png"), "nowhere"),
         ({"source": "blinn-phong"}, (), "blinn-phong:exponent or blinn-phong:log2"),
         ({"target": "ggx:rough"}, (), "roughness"),
-        ({"output": "gloss.png"}, (), "same file"),
+        ({"output": "gloss.png"}, (), "is the input"),
         ({"output": "rough.jpg"}, (), "JPEG"),
     ],
 )

@@ -198,7 +198,8 @@ def test_numbers_in_a_browser_are_those_of_the_command(page, pair, tmp_path):
 
 COPY = """
 const copied = [];
-Object.defineProperty(navigator, "clipboard", {value: {writeText: async (text) => copied.push(text)}});
+const clipboard = {writeText: async (text) => copied.push(text)};
+Object.defineProperty(navigator, "clipboard", {value: clipboard});
 byId("copy-number").click();
 byId("copy-command").click();
 return [copied, [state.number, byId("command").textContent]];

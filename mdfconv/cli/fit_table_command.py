@@ -77,7 +77,8 @@ def command(
         )
     if closed_forms:
         columns, rows, title = _closed_forms(exposure)
-        write_table(columns, rows, format_, output, title=title)
+        minor = ["formula", "worst_printed", "printed"]
+        write_table(columns, rows, format_, output, title=title, secondary=minor)
         return
     kept = chosen_metric(metric, exposure)
     if compare and kept.name != "unit":
@@ -86,7 +87,8 @@ def command(
         columns, rows, title = _comparison()
     else:
         columns, rows, title = _table(kept, sweep, m_b, extended)
-    write_table(columns, rows, format_, output, title=title)
+    minor = ["units", *(name for name in columns if name.startswith("rmse"))]
+    write_table(columns, rows, format_, output, title=title, secondary=minor)
 
 
 def _comparison() -> tuple[list[str], list[dict[str, Any]], str]:

@@ -20,7 +20,6 @@ from mdfconv.cli.tables import (
     console,
     form_of,
     print_table,
-    rich_table,
     table_text,
     tell,
     value_text,
@@ -34,6 +33,11 @@ _FOOTNOTE = (
     "[dim]Errors: root mean square and maximum under the metric, relative to the source's. "
     "ns: one evaluation in float32, now.[/dim]"
 )
+
+_HEADINGS = {
+    "distribution": "distribution", "parameter": "parameter", "method": "by", "ns": "ns",
+    "operations": "ops", "rmse": "RMSE", "max_error": "max error", "within": "within",
+}  # fmt: skip
 
 
 def command(
@@ -90,7 +94,7 @@ def _write(recommendation: Recommendation, asked: dict[str, Any], form: Format) 
         typer.echo(f"{table_text(columns, rows, form)}\n\n{sentence}")
     elif form is Format.table:
         out = console()
-        print_table(_table(rows, asked))
+        _print_table(rows, asked)
         out.print(sentence)
         out.print(_FOOTNOTE)
     else:
@@ -99,21 +103,8 @@ def _write(recommendation: Recommendation, asked: dict[str, Any], form: Format) 
         tell(reason)
 
 
-def _table(rows: list[dict[str, Any]], asked: dict[str, Any]) -> Any:
+def _print_table(rows: list[dict[str, Any]], asked: dict[str, Any]) -> None:
     title = f"{asked['from']} {asked['value']:g} within {asked['tolerance']:g}, {asked['metric']}"
-    shown = [
-        {
-            "distribution": row["distribution"],
-            "parameter": f"{row['parameter']:.6g}",
-            "by": row["method"],
-            "ns": f"{row['ns']:.3g}",
-            "ops": row["operations"],
-            "RMSE": f"{row['rmse']:.3g}",
-            "max error": f"{row['max_error']:.3g}",
-            "within": "✓" if row["within"] else "",
-        }
-        for row in rows
-    ]
+    shown = [{heading: row[key] for key, heading in _HEADINGS.items()} for row in rows]
     styles = ["bold" if row["chosen"] else "" if row["within"] else "dim" for row in rows]
-    numbers = ("parameter", "ns", "RMSE", "max error")
-    return rich_table(list(shown[0]), shown, title, styles, right=numbers)
+    print_table(list(shown[0]), shown, title, styles, secondary=("within", "RMSE"))

@@ -10,6 +10,9 @@ import typer
 from mdfconv.cli.options import FormatOption, MdfOption, OutputOption
 from mdfconv.cli.tables import write_table
 
+# Of a table in a narrow terminal.
+_SECONDARY = ("textbook", "worst", "error_in_eps", "cases", "out_of_range")
+
 
 class Part(StrEnum):
     """The parts of the audit."""
@@ -48,4 +51,5 @@ def command(
 
     rows = [asdict(finding) for finding in audit(mdf or (), part)]
     columns = [field.name for field in fields(Finding)]
-    write_table(columns, rows, format_, output, title="Hard cases: worst relative errors")
+    title = "Hard cases: worst relative errors"
+    write_table(columns, rows, format_, output, title=title, secondary=_SECONDARY)

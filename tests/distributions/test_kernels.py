@@ -169,7 +169,7 @@ def anisotropic_oracle(name, beta, phi, x, y):
         ("ggx", (0.1, 0.2), {}, "needs an azimuth"),
         ("ggx", (0.1, 0.2, 0.3), {"phi": 0}, "two members"),
         ("ggx", 0.1, {"phi": 0}, "needs a pair"),
-        ("gtr", 0.1, {"gamma": 0}, "γ > 0"),
+        ("gtr", 0.1, {"gamma": 0}, "1e-06 ≤ γ"),
         ("gtr", (0.1, 0.2), {}, "isotropic"),
         ("ggx", "rough", {}, "real numbers"),
         ("ggx", [[0.1], [0.2, 0.3]], {}, "regular shape"),

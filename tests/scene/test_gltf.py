@@ -682,7 +682,7 @@ def test_a_damaged_file_is_named(tmp_path):
     (tmp_path / "a.glb").write_bytes(GOOD[:30])
     status, _, err = run("gltf", "a.glb", "-o", "b.glb", "--from", OBJ2GLTF, cwd=tmp_path)
     assert status == 2
-    assert err.startswith("mdfconv: a.glb is a GLB of")
+    assert err.startswith("mdfconv: a.glb: is a GLB of")
 
 
 def test_the_table_fits_a_terminal(tmp_path):

@@ -95,11 +95,20 @@ def convert_files(
     for destination, _, conversion in converted:
         outcome = "wrote" if destination in written else "nothing to change in"
         tell(f"{outcome} {destination.output}")
+        _tell_notes(destination.source, conversion.notes)
         for place, text in conversion.problems:
             tell(f"{destination.source}:{place}: {text}: left as it is")
             problems = True
     if problems:
         raise typer.Exit(1)
+
+
+def _tell_notes(source: Path, notes: Sequence[tuple[int, str]]) -> None:
+    for line, text in notes[:MATERIALS_SHOWN]:
+        tell(f"note: {source}, line {line}: {text}")
+    more = len(notes) - MATERIALS_SHOWN
+    if more > 0:
+        tell(f"… and {more} more notes; {_JSON} has them all")
 
 
 @contextmanager

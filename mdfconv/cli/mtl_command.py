@@ -140,6 +140,7 @@ def _report(
             "materials": _rows(conversion.materials, metric, every=every, compare=compare),
             "textures": [vars(texture) for texture in conversion.textures],
             "problems": [{"line": line, "problem": text} for line, text in conversion.problems],
+            "notes": [{"line": line, "note": text} for line, text in conversion.notes],
         }
         for destination, conversion in converted
     ]

@@ -22,10 +22,10 @@ from mdfconv.cli.options import (
     PngOption,
     chosen_gamma,
 )
-from mdfconv.cli.outputs import check_outputs
+from mdfconv.cli.outputs import check_outputs, write_named
 from mdfconv.cli.tables import form_of, progress, table_text, tell, write_table
 from mdfconv.errors import MdfconvError
-from mdfconv.output.files import file_bytes, write_files
+from mdfconv.output.files import file_bytes
 from mdfconv.output.records import cell_text
 
 if TYPE_CHECKING:
@@ -223,7 +223,7 @@ def command(
         contents |= _report(analyses[0], report, separate=separate, logarithms=logarithms)
     if len(contents) > len(outputs):
         check_outputs(*(path for path in contents if path not in outputs), inputs=files)
-    write_files(contents)
+    write_named(contents)
     if not output:
         title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
         minor = [*_SECOND, *(name for name in names if name not in _CHIEF + _SECOND)]

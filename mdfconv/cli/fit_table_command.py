@@ -13,6 +13,7 @@ from mdfconv.cli.options import (
     OutputOption,
     chosen_metric,
     every_metric,
+    refuse_given,
 )
 from mdfconv.cli.tables import progress, write_table
 from mdfconv.errors import MdfconvError
@@ -25,6 +26,7 @@ _LARGEST_SWEEP = 10_000
 
 
 def command(
+    context: typer.Context,
     format_: FormatOption = None,
     output: OutputOption = None,
     compare: Annotated[
@@ -76,6 +78,7 @@ def command(
             "--sweep, --m-b or --extended"
         )
     if closed_forms:
+        refuse_given(context, ["metric"], "does not go with --closed-forms, which has every metric")
         columns, rows, title = _closed_forms(exposure)
         minor = ["formula", "worst_printed", "printed"]
         write_table(columns, rows, format_, output, title=title, secondary=minor)

@@ -20,7 +20,13 @@ from mdfconv.cli.material_files import (
     print_importers,
     print_materials,
 )
-from mdfconv.cli.options import ExposureOption, MetricOption, SpecularOption, chosen_metric
+from mdfconv.cli.options import (
+    ExposureOption,
+    MetricOption,
+    SpecularOption,
+    chosen_metric,
+    refuse_given,
+)
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import json_text
 
@@ -36,6 +42,7 @@ _HEADINGS = {
 
 
 def command(
+    context: typer.Context,
     files: Annotated[
         list[str],
         typer.Argument(metavar="IN.glb...", help="glTF or GLB files, or patterns such as '*.glb'."),
@@ -103,8 +110,13 @@ def command(
     mdfconv gltf lamp.gltf -o new.gltf --from blinn-phong:assimp-gltf --specular 0.5 --compare
     """
     if guess:
+        given = [option.name for option in context.command.params if option.name]
+        ignored = set(given) - {"files", "guess"}
+        refuse_given(context, ignored, "does not go with --guess, which only proposes --from")
         _propose(files)
         return
+    if not textures:
+        refuse_given(context, ["lossy"], "goes with --textures")
     if source is None:
         raise MdfconvError(
             "the rule by which the factors were stored is missing: give --from",
@@ -229,8 +241,6 @@ def _report(
         print_materials(record, _HEADINGS, record["count"])
         if compare:
             print_importers(record, [material.parameter for material in conversion.materials])
-        for path in record["textures"]:
-            typer.echo(f"texture {path}", err=True)
 
 
 def _rows(

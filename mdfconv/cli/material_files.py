@@ -93,8 +93,12 @@ def convert_files(
     report([(destination, conversion) for destination, _, conversion in converted])
     problems = False
     for destination, _, conversion in converted:
-        outcome = "wrote" if destination in written else "nothing to change in"
-        tell(f"{outcome} {destination.output}")
+        if destination in written:
+            beside = [path for path in (destination.backup, *conversion.files) if path]
+            for path in (destination.output, *beside):
+                tell(f"wrote {path}")
+        else:
+            tell(f"nothing to change in {destination.output}")
         _tell_notes(destination.source, conversion.notes)
         for place, text in conversion.problems:
             tell(f"{destination.source}:{place}: {text}: left as it is")

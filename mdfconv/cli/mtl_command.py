@@ -20,7 +20,7 @@ from mdfconv.cli.material_files import (
     print_importers,
     print_materials,
 )
-from mdfconv.cli.options import ExposureOption, MetricOption, chosen_metric
+from mdfconv.cli.options import ExposureOption, MetricOption, chosen_metric, refuse_given
 from mdfconv.cli.tables import progress
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import json_text
@@ -36,6 +36,7 @@ _HEADINGS = {
 
 
 def command(
+    context: typer.Context,
     libraries: Annotated[
         list[str],
         typer.Argument(
@@ -92,6 +93,8 @@ def command(
     wanted = to.strip().lower()
     if wanted != "roughness" and (compare or textures):
         raise MdfconvError("--compare and --textures go with --to roughness")
+    if not textures:
+        refuse_given(context, ["exponent_max"], "goes with --textures")
     kept = chosen_metric(metric, exposure)
 
     def convert(destination: Destination, data: bytes) -> MtlConversion:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import typer
-
 from mdfconv.cli.options import FolderOption
-from mdfconv.cli.tables import progress
+from mdfconv.cli.tables import progress, tell
 
 
 def command(
@@ -27,6 +25,7 @@ def command(
     written: list[str] = []
     with progress("Report", COUNT) as advance:
         for artefact in build(folder):
-            written += [str(folder / name) for name in artefact.files]
+            written += artefact.files
             advance(1)
-    typer.echo("\n".join([*written, str(folder / "README.md")]))
+    for name in (*written, "README.md"):
+        tell(f"wrote {folder / name}")

@@ -78,6 +78,7 @@ def write_table(
         from mdfconv.output.files import file_bytes, write_files
 
         write_files({output: file_bytes(table_text(columns, rows, form))})
+        tell(f"wrote {output}")
     elif form is Format.table:
         print_table(columns, rows, title, styles, secondary=secondary)
     else:

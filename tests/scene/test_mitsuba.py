@@ -552,10 +552,11 @@ def test_command(tmp_path):
 def test_several_files_in_place_keep_the_originals(tmp_path):
     for name in ("a.xml", "b.xml"):
         (tmp_path / name).write_bytes(BEFORE)
-    for done in ("wrote", "nothing to change in"):
+    # Each file and its backup.
+    for done, count in (("wrote", 4), ("nothing to change in", 2)):
         status, _, err = run("mitsuba", "--in-place", "*.xml", cwd=tmp_path)
         assert status == 0
-        assert err.count(f"mdfconv: {done} ") == 2
+        assert err.count(f"mdfconv: {done} ") == count
     assert {path.name for path in tmp_path.iterdir()} == {
         f"{x}.xml{end}" for x in "ab" for end in ("", ".bak")
     }

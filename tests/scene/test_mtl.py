@@ -253,10 +253,13 @@ def test_in_place_keeps_the_original(tmp_path):
     for name in ("a.mtl", "b.mtl"):
         (tmp_path / name).write_bytes(SOURCE)
     (tmp_path / "a.mtl").chmod(0o640)
-    for words, done in (([], "wrote"), ([], "nothing to change in"), (["--replace"], "wrote")):
+    # Each file and its backup.
+    for words, done, count in (
+        ([], "wrote", 4), ([], "nothing to change in", 2), (["--replace"], "wrote", 4),
+    ):  # fmt: skip
         status, _, err = run("mtl", "--in-place", "*.mtl", *words, cwd=tmp_path)
         assert status == 0
-        assert err.count(f"mdfconv: {done} ") == 2
+        assert err.count(f"mdfconv: {done} ") == count
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {f"{x}.mtl{end}" for x in "ab" for end in ("", ".bak", ".bak2")}
     assert (tmp_path / "a.mtl.bak2").read_bytes() == CONVERTED

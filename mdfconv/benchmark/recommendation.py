@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +23,9 @@ _ANGLES, _ROUNDS = 4_000_000, 5
 # A surface is converted once: costs of a conversion that differ by less are the same.
 _SAME_COST = 10.0
 NOT_CONVERTED = "none"
+# A shader pays for operations, NumPy for the time that its whole arrays take.
+SHADER, NUMPY = "shader", "numpy"
+_COSTS = {SHADER: "for a shader, by operations", NUMPY: "for NumPy, by the time measured now"}
 
 
 @dataclass(frozen=True)
@@ -60,8 +63,9 @@ class Recommendation:
 
     Parameters
     ----------
-    chosen : Candidate
-        The cheapest distribution within the tolerance, by the cheapest method within it.
+    answers : mapping of str to Candidate
+        For a ``"shader"`` the distribution within the tolerance with the fewest operations, for
+        ``"numpy"`` the quickest, each by the cheapest method within the tolerance.
     others : tuple of Candidate
         The other distributions by their best fits, those within the tolerance first.
     tolerance : float
@@ -70,21 +74,23 @@ class Recommendation:
         Why, in a sentence.
     """
 
-    chosen: Candidate
+    answers: Mapping[str, Candidate]
     others: tuple[Candidate, ...]
     tolerance: float
     reason: str
 
     def records(self) -> list[dict[str, Any]]:
-        """Return the candidates as rows of a table, the chosen one first."""
+        """Return the candidates as rows of a table, the answers first."""
+        chosen = list(dict.fromkeys(self.answers.values()))
         return [
             vars(candidate)
-            | {
-                "within": candidate.max_error <= self.tolerance,
-                "chosen": candidate is self.chosen,
-            }
-            for candidate in (self.chosen, *self.others)
+            | {"within": candidate.max_error <= self.tolerance, "chosen": self._use(candidate)}
+            for candidate in (*chosen, *self.others)
         ]
+
+    def _use(self, candidate: Candidate) -> str:
+        uses = [use for use, answer in self.answers.items() if answer is candidate]
+        return "both" if len(uses) > 1 else "".join(uses)
 
 
 def recommend(
@@ -96,9 +102,10 @@ def recommend(
 ) -> Recommendation:
     """Find the cheapest distribution and conversion whose error stays within a tolerance.
 
-    The cost of a distribution is its time measured now, in float32: of those as quick as the
-    quickest but for noise, the one with the fewest operations, then the one with the smallest
-    error. The cost of a conversion is the time that it takes for one value: of the methods
+    The cost of a distribution is in a shader the count of its operations, then its error. In
+    NumPy it is its time measured now, in float32: of those as quick as the quickest but for
+    noise, the one with the fewest operations, then the one with the smallest error. The cost of
+    a conversion is the time that it takes for one value: of the methods
     within a tenfold of the quickest, the one with the smallest error.
 
     Parameters
@@ -124,21 +131,25 @@ def recommend(
     surface = np.array([parameter])
     targets = {target.name: target for target in distributions} | {source.name: source}
     candidates = _timed_fits(source, surface, list(targets.values()), metric)
-    cheapest = choose(candidates, tolerance)
-    chosen = cheapest
-    if cheapest.method != NOT_CONVERTED:
-        target = targets[cheapest.distribution]
-        chosen = _cheapest_conversion(source, surface, target, metric, cheapest, tolerance)
+    cheapest = {use: choose(candidates, tolerance, use) for use in _COSTS}
+    converted = {
+        candidate: candidate
+        if candidate.method == NOT_CONVERTED
+        else _cheapest_conversion(
+            source, surface, targets[candidate.distribution], metric, candidate, tolerance
+        )
+        for candidate in cheapest.values()
+    }
+    answers = {use: converted[candidate] for use, candidate in cheapest.items()}
     others = sorted(
-        (candidate for candidate in candidates if candidate is not cheapest),
+        (candidate for candidate in candidates if candidate not in converted),
         key=lambda candidate: (candidate.max_error > tolerance, candidate.ns),
     )
-    return Recommendation(
-        chosen, tuple(others), tolerance, _reason(chosen, candidates, source.name, tolerance)
-    )
+    reason = _reason(answers, candidates, source.name, tolerance)
+    return Recommendation(answers, tuple(others), tolerance, reason)
 
 
-def choose(candidates: Sequence[Candidate], tolerance: float) -> Candidate:
+def choose(candidates: Sequence[Candidate], tolerance: float, use: str) -> Candidate:
     """Return the cheapest of the candidates within a tolerance.
 
     Parameters
@@ -147,15 +158,23 @@ def choose(candidates: Sequence[Candidate], tolerance: float) -> Candidate:
         At least one of them is within the tolerance.
     tolerance : float
         The largest `max_error` allowed.
+    use : str
+        What it is for, ``"shader"`` or ``"numpy"``.
     """
-    return min(_quickest(candidates, tolerance), key=lambda one: (one.operations, one.max_error))
+    rivals = _within(candidates, tolerance)
+    if use == NUMPY:
+        rivals = _quickest(rivals)
+    return min(rivals, key=lambda one: (one.operations, one.max_error))
 
 
-def _quickest(candidates: Sequence[Candidate], tolerance: float) -> list[Candidate]:
-    """Return those within the tolerance that are as quick as the quickest but for noise."""
-    within = [candidate for candidate in candidates if candidate.max_error <= tolerance]
-    least = min(candidate.ns for candidate in within)
-    return [candidate for candidate in within if candidate.ns <= (1 + NOISE) * least]
+def _within(candidates: Sequence[Candidate], tolerance: float) -> list[Candidate]:
+    return [candidate for candidate in candidates if candidate.max_error <= tolerance]
+
+
+def _quickest(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Return those that are as quick as the quickest but for noise."""
+    least = min(candidate.ns for candidate in candidates)
+    return [candidate for candidate in candidates if candidate.ns <= (1 + NOISE) * least]
 
 
 def _timed_fits(
@@ -219,23 +238,41 @@ def _conversion(
 
 
 def _reason(
-    chosen: Candidate, candidates: Sequence[Candidate], source: str, tolerance: float
+    answers: Mapping[str, Candidate],
+    candidates: Sequence[Candidate],
+    source: str,
+    tolerance: float,
 ) -> str:
+    within = _within(candidates, tolerance)
+    if len(within) == 1:
+        return f"keep {source}: nothing else stays within {tolerance:g} of it."
     own = next(candidate for candidate in candidates if candidate.method == NOT_CONVERTED)
-    count = sum(candidate.max_error <= tolerance for candidate in candidates)
+    costs = {
+        use: f"{answer.operations} operations to its {own.operations}"
+        if use == SHADER
+        else f"{answer.ns / own.ns:.2g} of its time{_tie(answer, within)}"
+        for use, answer in answers.items()
+    }
+    said: dict[Candidate, list[str]] = {}
+    for use, answer in answers.items():
+        said.setdefault(answer, []).append(use)
+    parts = []
+    for answer, uses in said.items():
+        cost = ", ".join(costs[use] for use in uses)
+        what = (
+            f"keep {source}"
+            if answer.method == NOT_CONVERTED
+            else f"{answer.distribution} by {answer.method} (maximum error {answer.max_error:.2g}, "
+            f"{cost})"
+        )
+        parts.append(f"{' and '.join(_COSTS[use] for use in uses)}: {what}")
+    return f"{'; '.join(parts)}. {len(within)} stay within {tolerance:g} of {source}."
+
+
+def _tie(answer: Candidate, within: Sequence[Candidate]) -> str:
     rivals = [
         candidate.distribution
-        for candidate in _quickest(candidates, tolerance)
-        if candidate.distribution != chosen.distribution
+        for candidate in _quickest(within)
+        if candidate.distribution != answer.distribution
     ]
-    tie = f" ({' and '.join(rivals)} as quick, but for noise)" if rivals else ""
-    if count == 1:
-        return f"keep {source}: nothing else stays within {tolerance:g} of it."
-    if chosen.method == NOT_CONVERTED:
-        return f"keep {source}: of {count} within {tolerance:g} it is the cheapest{tie}."
-    return (
-        f"{chosen.distribution} stays within {tolerance:g} of {source} "
-        f"(maximum error {chosen.max_error:.2g}) at {chosen.ns / own.ns:.2g} of its time, the "
-        f"cheapest of {count} that do{tie}; {chosen.method} is the cheapest conversion that keeps "
-        "it there."
-    )
+    return f"; {' and '.join(rivals)} as quick, but for noise" if rivals else ""

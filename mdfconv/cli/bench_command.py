@@ -10,7 +10,7 @@ import typer
 from mdfconv.cli import completion
 from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.tables import form_of, progress, table_text, write_table
+from mdfconv.cli.tables import console, form_of, progress, table_text, write_table
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import json_text
 
@@ -161,7 +161,7 @@ def _print(measurements: Measurements, form: Format, png: Path | None) -> None:
         sentences = page.sentences(measurements)
         for name, rows in page.tables(measurements).items():
             write_table(list(rows[0]), rows, form, title=page.title(measurements, name))
-            typer.echo("\n".join(sentences[name]) + "\n")
+            console().print("\n".join(sentences[name]), "\n", markup=False)
 
 
 def _csv(measurements: Measurements) -> str:

@@ -226,6 +226,8 @@ def _rules(method: str | None, metric: str | None, exposure: float) -> list[Rule
 
     if method is None and metric is None:
         return default_rules(exposure)
+    if metric is not None and method is not None and not method_named(method).follows_metric:
+        raise MdfconvError(f"--metric goes with a fit, not with --method {method}")
     kept = metric_named(metric or "unit")
     # A screen's picture is exposed as the scene is.
     kept = chosen_metric(kept.name, exposure) if kept.setting == "exposure" else kept

@@ -30,10 +30,8 @@ from mdfconv.cli.tables import (
     console,
     form_of,
     print_table,
-    rich_table,
     table_text,
     tell,
-    tell_rest,
     value_text,
 )
 from mdfconv.conversion import Conversion, explain, list_methods
@@ -243,8 +241,7 @@ def _write_tables(conversions: list[list[Conversion]], rule: _Rule) -> None:
     """Write tables a target: the methods under the metric, and the fits under the others."""
     out = console()
     for group in conversions:
-        print_table(_methods_table(group[:ROWS_SHOWN], rule))
-        tell_rest(len(group))
+        _print_methods(group, rule)
         for caution in dict.fromkeys(text for conversion in group for text in conversion.cautions):
             out.print(f"Note: {caution}.")
         inexact = [conversion for conversion in group if not conversion.exact]
@@ -257,7 +254,7 @@ def _write_tables(conversions: list[list[Conversion]], rule: _Rule) -> None:
             "relative to the source's.[/dim]"
         )
         if len(inexact) <= _VALUES_WITH_ALTERNATIVES:
-            print_table(_metrics_table(inexact, rule))
+            _print_metrics(inexact, rule)
 
 
 def _headings(conversion: Conversion) -> list[str]:
@@ -268,11 +265,10 @@ def _headings(conversion: Conversion) -> list[str]:
     )
 
 
-def _methods_table(group: list[Conversion], rule: _Rule) -> Any:
+def _print_methods(group: list[Conversion], rule: _Rule) -> None:
     headings = _headings(group[0])
-    columns = [*headings, "method", "RMSE", "max error"]
     rows, styles = [], []
-    for conversion in group:
+    for conversion in group[:ROWS_SHOWN]:
         rows.append(_row(conversion, headings))
         styles.append("bold")
         if len(group) <= _VALUES_WITH_ALTERNATIVES and not conversion.exact:
@@ -280,10 +276,10 @@ def _methods_table(group: list[Conversion], rule: _Rule) -> Any:
             rows += [_row(other, headings, first=False) for other in others]
             styles += ["dim"] * (len(rows) - len(styles))
     title = f"{' → '.join(headings[:2])}, {group[0].metric}"
-    return rich_table(columns, rows, title, styles, right=[*headings, "RMSE", "max error"])
+    print_table(list(rows[0]), rows, title, styles, count=len(group))
 
 
-def _metrics_table(group: list[Conversion], rule: _Rule) -> Any:
+def _print_metrics(group: list[Conversion], rule: _Rule) -> None:
     headings = _headings(group[0])
     rows = []
     for conversion in group:
@@ -293,23 +289,16 @@ def _metrics_table(group: list[Conversion], rule: _Rule) -> Any:
             row = _row(other, headings, first=number == 0)
             rows.append(row | {"fit under": str(metric), "for": metric.purpose})
     columns = [*headings, "fit under", "for"]
-    return rich_table(columns, rows, "Fits under the other metrics", right=headings)
+    print_table(columns, rows, "Fits under the other metrics")
 
 
-def _row(conversion: Conversion, headings: list[str], *, first: bool = True) -> dict[str, str]:
-    numbers = [_digits(conversion.value) if first else "", _digits(conversion.result)]
-    if len(headings) > 2:
-        numbers.append("" if conversion.gamma is None else _digits(conversion.gamma))
-    return dict(zip(headings, numbers, strict=True)) | {
+def _row(conversion: Conversion, headings: list[str], *, first: bool = True) -> dict[str, Any]:
+    numbers = [conversion.value if first else None, conversion.result, conversion.gamma]
+    return dict(zip(headings, numbers, strict=False)) | {
         "method": conversion.method,
-        "RMSE": _digits(conversion.rmse),
-        "max error": _digits(conversion.max_error),
+        "RMSE": conversion.rmse,
+        "max error": conversion.max_error,
     }
-
-
-def _digits(value: float | tuple[float, ...]) -> str:
-    """Return a number, or a pair with a comma, in six significant digits."""
-    return ",".join(f"{number:.6g}" for number in (value if isinstance(value, tuple) else (value,)))
 
 
 def _answers(conversion: Conversion, rules: Iterator[_Rule]) -> Iterator[Conversion]:

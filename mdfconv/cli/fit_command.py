@@ -26,17 +26,16 @@ from mdfconv.cli.options import (
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import form_of, progress, tell, write_table
 from mdfconv.errors import MdfconvError
+from mdfconv.output.records import cell_text
 
 if TYPE_CHECKING:
     from mdfconv.distributions import Distribution
     from mdfconv.measured.analysis import Analysis, FitOptions
     from mdfconv.measured.readers import ReadOptions
 
-# Of what a table on a terminal shows of fits to two directions.
-_SHOWN_OF_BRDFS = (
-    "distribution", "parameter", "stderr", "gamma", "reflectance", "diffuse", "specular", "rmse",
-    "error", "masking", "simplest",
-)  # fmt: skip
+# What a narrow terminal and the page of fits to two directions show first.
+_CHIEF = ("file", "channel", "distribution", "parameter", "gamma", "rmse", "simplest")
+_SECOND = ("stderr", "error", "reflectance", "diffuse", "specular", "masking")
 
 
 class Quantity(StrEnum):
@@ -224,7 +223,8 @@ def command(
     if report:
         contents |= _report(analyses[0], report, separate=separate, logarithms=logarithms)
     title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
-    write_table(names, rows, form, outputs, beside=contents, title=title)
+    minor = [*_SECOND, *(name for name in names if name not in _CHIEF + _SECOND)]
+    write_table(names, rows, form, outputs, beside=contents, title=title, secondary=minor)
     for analysis in analyses:
         _tell(analysis, tolerance, named=len(analyses) > 1)
 
@@ -305,10 +305,6 @@ def _table(
             rows += [file | channel | record for record in result.records()]
     names = list(dict.fromkeys(name for row in rows for name in row))
     rows = [{name: row.get(name) for name in names} for row in rows]
-    if form is Format.table and "specular" in names:
-        names = [name for name in names if name in ("file", "channel", *_SHOWN_OF_BRDFS)]
-        names = [name for name in names if any(row[name] is not None for row in rows)]
-        rows = [{name: row[name] for name in names} for row in rows]
     return names, _shown(rows, form)
 
 
@@ -318,8 +314,11 @@ def _report(
     from mdfconv.reports.fit_pages import report_of
     from mdfconv.reports.fit_report import report_files
 
-    _, rows = _table([analysis], Format.table, separate)
-    texts = [{name: _cell(value) for name, value in row.items()} for row in rows]
+    names, rows = _table([analysis], Format.markdown, separate)
+    if "specular" in names:
+        names = [name for name in names if name in _CHIEF + _SECOND]
+        names = [name for name in names if any(row[name] != "" for row in rows)]
+    texts = [{name: _cell(row[name]) for name in names} for row in rows]
     line = join(["mdfconv", *sys.argv[1:]])
     return report_files(report_of(analysis, texts, line, logarithms=logarithms), path)
 
@@ -382,10 +381,10 @@ def _targets(names: list[str] | None, gamma: float | None) -> list[Distribution]
 
 
 def _shown(rows: list[dict[str, Any]], form: Format) -> list[dict[str, Any]]:
-    """Return the records for the form: lists and nulls in JSON, text in the others."""
-    if form is Format.json:
+    """Return the records for the form: lists and nulls where they have a place, else text."""
+    if form in (Format.json, Format.table):
         return rows
-    number = repr if form is Format.csv else "{:.4g}".format
+    number = cell_text if form is Format.markdown else repr
     return [{key: _text(value, number) for key, value in row.items()} for row in rows]
 
 

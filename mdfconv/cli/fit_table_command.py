@@ -14,6 +14,7 @@ from mdfconv.cli.options import (
     OutputOption,
     chosen_metric,
     every_metric,
+    refuse_given,
 )
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import progress, write_table
@@ -27,6 +28,7 @@ _LARGEST_SWEEP = 10_000
 
 
 def command(
+    context: typer.Context,
     format_: FormatOption = None,
     output: OutputOption = None,
     compare: Annotated[
@@ -80,8 +82,10 @@ def command(
         )
     outputs = Outputs(table=output, force=force)
     if closed_forms:
+        refuse_given(context, ["metric"], "does not go with --closed-forms, which has every metric")
         columns, rows, title = _closed_forms(exposure)
-        write_table(columns, rows, format_, outputs, title=title)
+        minor = ["formula", "worst_printed", "printed"]
+        write_table(columns, rows, format_, outputs, title=title, secondary=minor)
         return
     kept = chosen_metric(metric, exposure)
     if compare and kept.name != "unit":
@@ -90,7 +94,8 @@ def command(
         columns, rows, title = _comparison()
     else:
         columns, rows, title = _table(kept, sweep, m_b, extended)
-    write_table(columns, rows, format_, outputs, title=title)
+    minor = ["units", *(name for name in columns if name.startswith("rmse"))]
+    write_table(columns, rows, format_, outputs, title=title, secondary=minor)
 
 
 def _comparison() -> tuple[list[str], list[dict[str, Any]], str]:

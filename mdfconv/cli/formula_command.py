@@ -17,6 +17,7 @@ from mdfconv.cli.options import (
     ToOption,
     chosen_metric,
     fixed_gamma,
+    refuse_given,
 )
 from mdfconv.cli.tables import write_table
 from mdfconv.errors import MdfconvError
@@ -28,6 +29,7 @@ _COLUMNS = ("operations", "worst_error", "formula")
 
 
 def command(
+    context: typer.Context,
     source: FromOption,
     target: ToOption,
     tolerance: Annotated[
@@ -83,8 +85,12 @@ def command(
     from mdfconv.conversion.endpoint import endpoints, with_specular
     from mdfconv.formula import LANGUAGES, Problem, cheapest, write_formula
 
-    if format_ and not every:
-        raise MdfconvError("--format is the form of the table of --all; a formula has --lang")
+    if every:
+        refuse_given(context, ["tolerance"], "does not go with --all, which has every error")
+    else:
+        refuse_given(
+            context, ["format_"], "is the form of the table of --all: a formula has --lang"
+        )
     LANGUAGES[language]  # names are wrong more often than ranges
     ends = endpoints(*with_specular(source, target, specular), fixed_gamma(gamma))
     low, high = ends[0].stored.typical if range_ is None else _range(range_)

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.options import ForceOption, Format, FormatOption, OutputOption, PngOption
+from mdfconv.cli.options import (
+    ForceOption,
+    Format,
+    FormatOption,
+    OutputOption,
+    PngOption,
+    refuse_given,
+)
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 from mdfconv.errors import MdfconvError
@@ -16,6 +23,7 @@ if TYPE_CHECKING:
     from mdfconv.brdf.furnace import FurnaceModel
     from mdfconv.distributions.evaluation import Array
 
+_NOT_OF_SPEED = ("normalizer", "masking", "points", "samples", "seed", "png")
 _MOST_POINTS = 1001
 _MOST_SAMPLES = 10_000_000
 # Samples at all points together: some seconds.
@@ -23,6 +31,7 @@ _MOST_DIRECTIONS = 100_000_000
 
 
 def command(
+    context: typer.Context,
     parameter: Annotated[
         float,
         typer.Argument(metavar="PARAMETER", help="Exponent of the Phong BRDFs, α of the others."),
@@ -94,10 +103,11 @@ def command(
     if speed:
         if brdf != "modified-phong":
             raise MdfconvError("--speed compares the normalizers of --brdf modified-phong")
-        if normalizer or samples or png:
-            raise MdfconvError("--speed takes no --normalizer, --mc or --png: it is a table of all")
+        refuse_given(context, _NOT_OF_SPEED, "does not go with --speed, a table of all normalizers")
         _write_speed(parameter, format_, Outputs(table=output, force=force))
         return
+    if samples is None:
+        refuse_given(context, ["seed"], "goes with --mc")
     if not 2 <= points <= _MOST_POINTS:
         raise MdfconvError(f"--points is from 2 to {_MOST_POINTS}")
     if samples is not None and not 2 <= samples <= _MOST_SAMPLES:

@@ -17,7 +17,6 @@ from mdfconv.cli.material_files import (
     about,
     convert_files,
     importer_rows,
-    number_cell,
     print_importers,
     print_materials,
 )
@@ -27,6 +26,7 @@ from mdfconv.cli.options import (
     MetricOption,
     SpecularOption,
     chosen_metric,
+    refuse_given,
 )
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import json_text
@@ -36,8 +36,14 @@ if TYPE_CHECKING:
     from mdfconv.scene.gltf import GltfConversion, GltfMaterial
     from mdfconv.scene.material_files import Destination
 
+_HEADINGS = {
+    "index": "#", "name": "material", "value": "was", "result": "is", "rmse": "RMSE",
+    "notes": "notes",
+}  # fmt: skip
+
 
 def command(
+    context: typer.Context,
     files: Annotated[
         list[str],
         typer.Argument(metavar="IN.glb...", help="glTF or GLB files, or patterns such as '*.glb'."),
@@ -106,8 +112,13 @@ def command(
     mdfconv gltf lamp.gltf -o new.gltf --from blinn-phong:assimp-gltf --specular 0.5 --compare
     """
     if guess:
+        given = [option.name for option in context.command.params if option.name]
+        ignored = set(given) - {"files", "guess"}
+        refuse_given(context, ignored, "does not go with --guess, which only proposes --from")
         _propose(files)
         return
+    if not textures:
+        refuse_given(context, ["lossy"], "goes with --textures")
     if source is None:
         raise MdfconvError(
             "the rule by which the factors were stored is missing: give --from",
@@ -222,9 +233,7 @@ def _report(
             "to": names[1],
             "metric": str(metric),
             "count": len(conversion.materials),
-            "materials": _rows(
-                conversion.materials[: None if every else MATERIALS_SHOWN], metric, compare=compare
-            ),
+            "materials": _rows(conversion.materials, metric, every=every, compare=compare),
             "textures": [str(path) for path in conversion.files],
             "problems": [{"place": place, "problem": text} for place, text in conversion.problems],
         }
@@ -233,37 +242,19 @@ def _report(
     if every:
         typer.echo(json_text(records))
         return
-    for record in records:
-        _print_table(record)
+    for record, (_, conversion) in zip(records, converted, strict=True):
+        print_materials(record, _HEADINGS, record["count"])
         if compare:
-            print_importers(record["materials"])
-        for path in record["textures"]:
-            typer.echo(f"texture {path}", err=True)
+            print_importers(record, [material.parameter for material in conversion.materials])
 
 
 def _rows(
-    materials: Sequence[GltfMaterial], metric: Metric, *, compare: bool
+    materials: Sequence[GltfMaterial], metric: Metric, *, every: bool, compare: bool
 ) -> list[dict[str, Any]]:
+    shown = materials if every else materials[:MATERIALS_SHOWN]
     rows: list[dict[str, Any]] = [
-        vars(material) | {"notes": list(material.notes)} for material in materials
+        vars(material) | {"notes": list(material.notes)} for material in shown
     ]
     if compare:
-        importer_rows(rows, [material.parameter for material in materials], metric)
+        importer_rows(rows, [material.parameter for material in shown], metric, every=every)
     return rows
-
-
-def _print_table(record: dict[str, Any]) -> None:
-    """Print what was converted to standard error."""
-    shown = [
-        {
-            "#": str(row["index"]),
-            "material": row["name"],
-            "was": number_cell(row["value"], 6),
-            "is": number_cell(row["result"], 6),
-            "RMSE": number_cell(row["rmse"], 3),
-            "notes": "; ".join(row["notes"]),
-        }
-        for row in record["materials"]
-    ]
-    title = f"{record['file']}, {record['metric']} metric"
-    print_materials(record["file"], shown, title, ["#", "was", "is", "RMSE"], record["count"])

@@ -14,7 +14,7 @@ from mdfconv.cli.options import (
     OptionalMetricOption,
     asked_metric,
 )
-from mdfconv.cli.tables import console, form_of, print_table, rich_table, write_table
+from mdfconv.cli.tables import form_of, print_table, write_table
 from mdfconv.distributions import Distribution, list_distributions
 from mdfconv.distributions.dialects import dialects_of
 from mdfconv.distributions.parameter import Parameter
@@ -23,6 +23,8 @@ from mdfconv.fitting.metrics import Metric, metric_named
 
 # Importers' roughness is seen under light from all around.
 _NATURAL = "environment"
+# Of the table of encodings what a narrow terminal leaves out first.
+_SECONDARY = ("N 100", "programs", "N 10", "N 1000")
 
 
 def command(
@@ -57,7 +59,7 @@ def command(
     form = form_of(format_, in_pipe=Format.plain)
     records = [_record(mdf) for mdf in list_distributions()]
     if form is Format.table:
-        console().print(_table(records))
+        _print_table(records)
     else:
         columns = ["name"] if form is Format.plain else list(records[0])
         write_table(columns, records, form)
@@ -81,15 +83,15 @@ def _list_encodings(metric: Metric, format_: Format | None) -> None:
         }
         for record in records
     ]
-    right = [f"N {n}" for n in EXPONENTS]
     title = f"Encodings, and the RMSE of their rules under {metric}"
-    print_table(rich_table(list(rows[0]), rows, title, right=right))
+    print_table(list(rows[0]), rows, title, secondary=_SECONDARY)
 
 
-def _error(rmse: float | None) -> str:
+def _error(rmse: float | None) -> float | str | None:
+    """Return an error in two digits; none where there is no roughness."""
     if rmse is None:
-        return ""
-    return "mirror" if math.isinf(rmse) else f"{rmse:.2g}"
+        return None
+    return "mirror" if math.isinf(rmse) else float(f"{rmse:.2g}")
 
 
 def _record(mdf: Distribution) -> dict[str, Any]:
@@ -116,27 +118,21 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
     }
 
 
-def _table(records: list[dict[str, Any]]) -> Any:
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, show_lines=True)
-    table.add_column("name", style="bold", no_wrap=True)
-    for heading in ("aliases", "parameter", "unit form D̄", "source"):
-        table.add_column(heading)
-    for record in records:
-        parameters = "; ".join(
-            f"{parameter['name']}: {parameter['legal']}, typically "
-            f"{parameter['typical'][0]:g} to {parameter['typical'][1]:g}"
-            for parameter in record["parameters"]
-        )
-        encodings = f"; encodings: {', '.join(record['encodings'])}" * bool(record["encodings"])
-        pair = "; or a pair X,Y" * record["anisotropic"]
-        table.add_row(
-            record["name"],
-            ", ".join(record["aliases"]),
-            parameters + pair + encodings,
-            record["unit_form"],
-            record["source"],
-        )
-    return table
+def _print_table(records: list[dict[str, Any]]) -> None:
+    rows = [
+        {
+            "name": record["name"],
+            "parameter": "; ".join(
+                f"{parameter['name']}: {parameter['legal']}, typically "
+                f"{parameter['typical'][0]:g} to {parameter['typical'][1]:g}"
+                for parameter in record["parameters"]
+            )
+            + "; or a pair X,Y" * record["anisotropic"],
+            "aliases": ", ".join(record["aliases"]),
+            "unit form D̄": record["unit_form"],
+            "source": record["source"],
+            "encodings": ", ".join(record["encodings"]),
+        }
+        for record in records
+    ]
+    print_table(list(rows[0]), rows)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from itertools import chain
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from mdfconv.cli.tables import ROWS_SHOWN, print_table, rich_table, tell, tell_rest
+from mdfconv.cli.tables import ROWS_SHOWN, print_table, tell
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ else:
 
 # Two milliseconds a row: of a hundred thousand materials the report is not to take the time.
 MATERIALS_SHOWN = 100
+_JSON = "--format json"
 
 
 class ReportFormat(StrEnum):
@@ -106,8 +107,13 @@ def convert_files(
     report([(destination, conversion) for destination, _, conversion in converted])
     problems = False
     for destination, _, conversion in converted:
-        outcome = "wrote" if destination in written else "nothing to change in"
-        tell(f"{outcome} {destination.output}")
+        if destination in written:
+            beside = [path for path in (destination.backup, *conversion.files) if path]
+            for path in (destination.output, *beside):
+                tell(f"wrote {path}")
+        else:
+            tell(f"nothing to change in {destination.output}")
+        _tell_notes(destination.source, conversion.notes)
         for place, text in conversion.problems:
             tell(f"{destination.source}:{place}: {text}: left as it is")
             problems = True
@@ -115,9 +121,12 @@ def convert_files(
         raise typer.Exit(1)
 
 
-def number_cell(value: float, digits: int) -> str:
-    """Return a number as the tables of these commands show it."""
-    return "—" if math.isnan(value) else f"{value:.{digits}g}"
+def _tell_notes(source: Path, notes: Sequence[tuple[int, str]]) -> None:
+    for line, text in notes[:MATERIALS_SHOWN]:
+        tell(f"note: {source}, line {line}: {text}")
+    more = len(notes) - MATERIALS_SHOWN
+    if more > 0:
+        tell(f"… and {more} more notes; {_JSON} has them all")
 
 
 @contextmanager
@@ -126,41 +135,49 @@ def about(path: Path) -> Iterator[None]:
     try:
         yield
     except MdfconvError as error:
-        raise MdfconvError(f"{path} {error.reason}", error.hint, argument=error.argument) from None
+        raise MdfconvError(f"{path}: {error.reason}", error.hint, argument=error.argument) from None
 
 
 def print_materials(
-    file: str, rows: Sequence[dict[str, str]], title: str, right: Sequence[str], count: int
+    record: Mapping[str, Any],
+    headings: Mapping[str, str],
+    count: int,
+    secondary: Sequence[str] = (),
 ) -> None:
     """Print a table of what was converted to standard error.
 
     Parameters
     ----------
-    file : str
-        The file.
-    rows : sequence of dict
-        The cells of the first `MATERIALS_SHOWN` materials, by headings.
-    title : str
-        What stands above the table.
-    right : sequence of str
-        The headings of numbers.
+    record : mapping
+        What is said of a file: ``file``, ``metric`` and rows of ``materials``.
+    headings : mapping
+        The keys of the rows that are shown, and their headings.
     count : int
         How many materials there are.
+    secondary : sequence of str
+        As for `write_table`.
     """
+    rows = [{heading: row[key] for key, heading in headings.items()} for row in record["materials"]]
+    title = f"{record['file']}, {record['metric']} metric"
     if rows:
-        print_table(rich_table(list(rows[0]), rows, title, right=right), err=True)
+        columns = list(headings.values())
+        print_table(
+            columns, rows, title, secondary=secondary, err=True, everything=_JSON, count=count
+        )
     else:
-        typer.echo(f"{file}: nothing to convert", err=True)
-    tell_rest(count, "--format json", MATERIALS_SHOWN)
+        typer.echo(f"{record['file']}: nothing to convert", err=True)
 
 
-def importer_rows(rows: list[dict[str, Any]], exponents: Sequence[float], metric: Metric) -> None:
-    """Add to the rows of materials what importers make of their exponents, if they have some."""
+def importer_rows(
+    rows: list[dict[str, Any]], exponents: Sequence[float], metric: Metric, *, every: bool
+) -> None:
+    """Add to rows of materials what importers make of their exponents, to all or those shown."""
     import numpy as np
 
-    from mdfconv.scene.shininess import importer_results
+    from mdfconv.scene.shininess import IMPORTERS, importer_results
 
-    known = [number for number, exponent in enumerate(exponents) if math.isfinite(exponent)]
+    most = None if every else ROWS_SHOWN // len(IMPORTERS)
+    known = [number for number, exponent in enumerate(exponents) if math.isfinite(exponent)][:most]
     results = importer_results(np.array([exponents[number] for number in known]), metric)
     for row in rows:
         row["importers"] = {}
@@ -170,19 +187,20 @@ def importer_rows(rows: list[dict[str, Any]], exponents: Sequence[float], metric
         }
 
 
-def print_importers(materials: Sequence[dict[str, Any]]) -> None:
-    """Print what importers make of each material to standard error."""
+def print_importers(record: Mapping[str, Any], exponents: Sequence[float]) -> None:
+    """Print what importers make of the exponents of a file to standard error."""
+    from mdfconv.scene.shininess import IMPORTERS
+
     rows = [
         {
             "material": row["name"],
             "importer": name,
-            "roughness": number_cell(result["roughness"], 3),
-            "RMSE": "a mirror" if math.isinf(result["rmse"]) else number_cell(result["rmse"], 3),
+            "roughness": result["roughness"],
+            "RMSE": "a mirror" if math.isinf(result["rmse"]) else result["rmse"],
         }
-        for row in materials
+        for row in record["materials"]
         for name, result in row["importers"].items()
     ]
     if rows:
-        table = rich_table(list(rows[0]), rows[:ROWS_SHOWN], "Importers", right=list(rows[0])[2:])
-        print_table(table, err=True)
-        tell_rest(len(rows), "--format json")
+        count = len(IMPORTERS) * sum(map(math.isfinite, exponents))
+        print_table(list(rows[0]), rows, "Importers", err=True, everything=_JSON, count=count)

@@ -8,24 +8,30 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli.material_files import (
+    MATERIALS_SHOWN,
     InPlaceOption,
     ReportFormat,
     ReportFormatOption,
     ResultOption,
+    about,
     convert_files,
-    number_cell,
+    print_materials,
 )
 from mdfconv.cli.options import ExposureOption, ForceOption, MetricOption, chosen_metric
-from mdfconv.cli.tables import ROWS_SHOWN, print_table, rich_table, tell, tell_rest
-from mdfconv.errors import MdfconvError
+from mdfconv.cli.tables import tell
 from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
     from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.material_files import Destination
-    from mdfconv.scene.mitsuba import MitsubaConversion, Value
+    from mdfconv.scene.mitsuba import MitsubaConversion
 
-_RIGHT = ("line", "α", "new α", "RMSE", "kept")
+_HEADINGS = {
+    "name": "BSDF", "line": "line", "distribution": "from", "value": "α", "result": "new α",
+    "rmse": "RMSE", "rmse_unchanged": "kept", "notes": "notes",
+}  # fmt: skip
+# With --compare 80 columns are too few for all.
+_SECONDARY = ("from", "line")
 
 
 def command(
@@ -74,10 +80,8 @@ def command(
     def convert(destination: Destination, data: bytes) -> MitsubaConversion:
         paths = destination.source, destination.output
         bitmaps = BitmapConverter(*paths, wanted, kept) if textures else None
-        try:
+        with about(destination.source):
             conversion = convert_mitsuba(data, wanted, metric=kept, texture=bitmaps)
-        except MdfconvError as error:
-            raise MdfconvError(f"{destination.source}: {error.reason}", error.hint) from None
         if bitmaps is None:
             return conversion
         files = bitmaps.files({texture.result for texture in conversion.textures})
@@ -89,9 +93,8 @@ def command(
             typer.echo(json_text(records))
             return
         for each in converted:
-            record = _record(*each, wanted, kept, compare=compare, most=ROWS_SHOWN)
-            _print_table(record)
-            tell_rest(len(each[1].materials), "--format json")
+            record = _record(*each, wanted, kept, compare=compare, most=MATERIALS_SHOWN)
+            _print_report(record, len(each[1].materials))
 
     convert_files(scenes, output, in_place=in_place, force=force, convert=convert, report=report)
 
@@ -125,27 +128,11 @@ def _record(
     }
 
 
-def _print_table(record: dict[str, Any]) -> None:
+def _print_report(record: dict[str, Any], count: int) -> None:
     """Print what was converted to standard error."""
-    rows = [
-        {
-            "BSDF": row["name"],
-            # With one column more, 80 are too few for both.
-            **({} if "rmse_unchanged" in row else {"line": str(row["line"])}),
-            "from": row["distribution"],
-            "α": _cell(row["value"]),
-            "new α": _cell(row["result"]),
-            "RMSE": number_cell(row["rmse"], 3),
-        }
-        | ({"kept": number_cell(row["rmse_unchanged"], 3)} if "rmse_unchanged" in row else {})
-        | {"notes": "; ".join(row["notes"])}
-        for row in record["materials"]
-    ]
-    if rows:
-        title = f"{record['file']}, {record['target']}, {record['metric']} metric"
-        print_table(rich_table(list(rows[0]), rows, title, right=_RIGHT), err=True)
-    else:
-        typer.echo(f"{record['file']}: nothing to convert", err=True)
+    shown = record["materials"][:1]
+    headings = {key: text for key, text in _HEADINGS.items() if shown and key in shown[0]}
+    print_materials(record, headings, count, _SECONDARY)
     for texture in record["textures"]:
         typer.echo(
             f"{texture['file']} became {texture['result']} (line {texture['line']})", err=True
@@ -153,8 +140,3 @@ def _print_table(record: dict[str, Any]) -> None:
     for include in record["includes"]:
         place = f"{record['file']}:{include['line']}"
         tell(f"{place}: {include['file']} is included, and is not read: convert it, too")
-
-
-def _cell(value: Value) -> str:
-    axes = value if isinstance(value, tuple) else (value,)
-    return ", ".join(number_cell(axis, 5) for axis in axes)

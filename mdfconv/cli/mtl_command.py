@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,11 +16,16 @@ from mdfconv.cli.material_files import (
     ResultOption,
     convert_files,
     importer_rows,
-    number_cell,
     print_importers,
     print_materials,
 )
-from mdfconv.cli.options import ExposureOption, ForceOption, MetricOption, chosen_metric
+from mdfconv.cli.options import (
+    ExposureOption,
+    ForceOption,
+    MetricOption,
+    chosen_metric,
+    refuse_given,
+)
 from mdfconv.cli.tables import progress
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import json_text
@@ -30,8 +36,13 @@ if TYPE_CHECKING:
     from mdfconv.scene.mtl import Material, MtlConversion
     from mdfconv.scene.mtl_textures import MtlTextures
 
+_HEADINGS = {
+    "name": "material", "shininess": "Ns", "roughness": "Pr", "rmse": "RMSE", "notes": "notes",
+}  # fmt: skip
+
 
 def command(
+    context: typer.Context,
     libraries: Annotated[
         list[str],
         typer.Argument(
@@ -89,6 +100,8 @@ def command(
     wanted = to.strip().lower()
     if wanted != "roughness" and (compare or textures):
         raise MdfconvError("--compare and --textures go with --to roughness")
+    if not textures:
+        refuse_given(context, ["exponent_max"], "goes with --textures")
     kept = chosen_metric(metric, exposure)
 
     def convert(destination: Destination, data: bytes) -> MtlConversion:
@@ -133,51 +146,37 @@ def _report(
     form: ReportFormat,
     compare: bool,
 ) -> None:
+    every = form is ReportFormat.json
     records: list[dict[str, Any]] = [
         {
             "file": str(destination.source),
             "output": str(destination.output),
             "metric": str(metric),
-            "materials": _rows(conversion.materials, metric, compare=compare),
+            "materials": _rows(conversion.materials, metric, every=every, compare=compare),
             "textures": [vars(texture) for texture in conversion.textures],
             "problems": [{"line": line, "problem": text} for line, text in conversion.problems],
+            "notes": [{"line": line, "note": text} for line, text in conversion.notes],
         }
         for destination, conversion in converted
     ]
-    if form is ReportFormat.json:
+    if every:
         typer.echo(json_text(records))
         return
-    for record in records:
-        _print_table(record)
+    for record, (_, conversion) in zip(records, converted, strict=True):
+        print_materials(record, _HEADINGS, len(conversion.materials))
+        for texture in record["textures"]:
+            typer.echo(f"{texture['keyword']} {texture['file']} (line {texture['line']})", err=True)
         if compare:
-            print_importers(record["materials"])
+            print_importers(record, [material.shininess for material in conversion.materials])
 
 
 def _rows(
-    materials: tuple[Material, ...], metric: Metric, *, compare: bool
+    materials: Sequence[Material], metric: Metric, *, every: bool, compare: bool
 ) -> list[dict[str, Any]]:
+    shown = materials if every else materials[:MATERIALS_SHOWN]
     rows: list[dict[str, Any]] = [
-        vars(material) | {"notes": list(material.notes)} for material in materials
+        vars(material) | {"notes": list(material.notes)} for material in shown
     ]
     if compare:
-        importer_rows(rows, [material.shininess for material in materials], metric)
+        importer_rows(rows, [material.shininess for material in shown], metric, every=every)
     return rows
-
-
-def _print_table(record: dict[str, Any]) -> None:
-    """Print what was converted to standard error."""
-    rows = record["materials"]
-    shown = [
-        {
-            "material": row["name"],
-            "Ns": number_cell(row["shininess"], 6),
-            "Pr": number_cell(row["roughness"], 6),
-            "RMSE": number_cell(row["rmse"], 3),
-            "notes": "; ".join(row["notes"]),
-        }
-        for row in rows[:MATERIALS_SHOWN]
-    ]
-    title = f"{record['file']}, {record['metric']} metric"
-    print_materials(record["file"], shown, title, ["Ns", "Pr", "RMSE"], len(rows))
-    for texture in record["textures"]:
-        typer.echo(f"{texture['keyword']} {texture['file']} (line {texture['line']})", err=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -142,6 +143,29 @@ DpiOption = Annotated[
         "--dpi", metavar="N", min=10, max=_LARGEST_DPI, help="Resolution of pictures, dots an inch."
     ),
 ]
+
+
+def refuse_given(context: typer.Context, names: Collection[str], why: str) -> None:
+    """Refuse options that would be ignored.
+
+    Parameters
+    ----------
+    context : typer.Context
+        Of the command.
+    names : collection of str
+        The parameters of the command.
+    why : str
+        What follows the option's name in the refusal.
+
+    Raises
+    ------
+    MdfconvError
+        If one is on the command line.
+    """
+    for option in context.command.params:
+        source = context.get_parameter_source(option.name or "")
+        if option.name in names and source is not None and source.name == "COMMANDLINE":
+            raise MdfconvError(f"{option.opts[0]} {why}")
 
 
 def chosen_metric(name: str, exposure: float | None = None) -> Metric:

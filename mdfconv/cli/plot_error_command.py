@@ -18,6 +18,7 @@ from mdfconv.cli.options import (
     MethodOption,
     OptionalMetricOption,
     asked_metric,
+    refuse_given,
 )
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
 from mdfconv.cli.tables import write_table
@@ -34,6 +35,7 @@ _COLUMNS = ("figure", "distribution", "parameter", "max_error_percent", "beta_ra
 
 
 def command(
+    context: typer.Context,
     m_b: Annotated[
         list[float] | None,
         typer.Option("--m-b", metavar="M", help="Beckmann's m_B; repeatable; default the paper's."),
@@ -73,6 +75,8 @@ def command(
 
     mdfconv plot-error --m-b 0.2 --reference ggx --mdf beckmann --no-csv --output /tmp
     """
+    if not png and not svg:
+        refuse_given(context, ["dpi", "log"], "is of pictures: give no --no-png, or --svg")
     asked = asked_metric(metric, exposure)
     sets = _sets(m_b, method, asked, reference, mdf)
     endings = [*[".png"] * png, *[".svg"] * svg, *["b.csv"] * csv]

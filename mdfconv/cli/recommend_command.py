@@ -20,7 +20,6 @@ from mdfconv.cli.tables import (
     console,
     form_of,
     print_table,
-    rich_table,
     table_text,
     tell,
     value_text,
@@ -32,8 +31,13 @@ if TYPE_CHECKING:
 
 _FOOTNOTE = (
     "[dim]Errors: root mean square and maximum under the metric, relative to the source's. "
-    "ns: one evaluation in float32, now.[/dim]"
+    "ops: of one evaluation, as a shader has it. ns: the same in float32 in NumPy, now.[/dim]"
 )
+
+_HEADINGS = {
+    "distribution": "distribution", "parameter": "parameter", "method": "by", "chosen": "for",
+    "operations": "ops", "ns": "ns", "max_error": "max error", "rmse": "RMSE", "within": "within",
+}  # fmt: skip
 
 
 def command(
@@ -53,9 +57,10 @@ def command(
 ) -> None:
     """Recommend the cheapest distribution and conversion for a surface.
 
-    Times every distribution on this machine, which takes about a second, and leaves out those
-    whose best fit exceeds the tolerance. Of the quickest within 10 % it takes the one with the
-    fewest operations, and the cheapest conversion that stays within the tolerance.
+    Leaves out distributions whose best fit exceeds the tolerance. For a shader the cheapest has the
+    fewest operations; for NumPy it is the quickest on this machine, timed now in about a second, of
+    several within 10 % the one with the fewest operations. Each with the cheapest conversion that
+    stays within the tolerance.
 
     Examples:
 
@@ -81,39 +86,29 @@ def command(
 
 def _write(recommendation: Recommendation, asked: dict[str, Any], form: Format) -> None:
     rows, reason = recommendation.records(), recommendation.reason
-    columns, chosen = list(rows[0]), recommendation.chosen
+    columns, answers = list(rows[0]), recommendation.answers
     sentence = reason[0].upper() + reason[1:]
     if form is Format.json:
-        answer = {"chosen": chosen.distribution, "reason": reason, "candidates": rows}
-        typer.echo(json_text(asked | answer))
+        chosen = {use: vars(candidate) for use, candidate in answers.items()}
+        typer.echo(json_text(asked | chosen | {"reason": reason, "candidates": rows}))
     elif form is Format.markdown:
         typer.echo(f"{table_text(columns, rows, form)}\n\n{sentence}")
     elif form is Format.table:
         out = console()
-        print_table(_table(rows, asked))
+        _print_table(rows, asked)
         out.print(sentence)
         out.print(_FOOTNOTE)
     else:
-        line = f"{chosen.distribution} {value_text(chosen.parameter)} {chosen.method}"
-        typer.echo(line if form is Format.plain else table_text(columns, rows, form))
+        lines = [
+            f"{use} {answer.distribution} {value_text(answer.parameter)} {answer.method}"
+            for use, answer in answers.items()
+        ]
+        typer.echo("\n".join(lines) if form is Format.plain else table_text(columns, rows, form))
         tell(reason)
 
 
-def _table(rows: list[dict[str, Any]], asked: dict[str, Any]) -> Any:
+def _print_table(rows: list[dict[str, Any]], asked: dict[str, Any]) -> None:
     title = f"{asked['from']} {asked['value']:g} within {asked['tolerance']:g}, {asked['metric']}"
-    shown = [
-        {
-            "distribution": row["distribution"],
-            "parameter": f"{row['parameter']:.6g}",
-            "by": row["method"],
-            "ns": f"{row['ns']:.3g}",
-            "ops": row["operations"],
-            "RMSE": f"{row['rmse']:.3g}",
-            "max error": f"{row['max_error']:.3g}",
-            "within": "✓" if row["within"] else "",
-        }
-        for row in rows
-    ]
+    shown = [{heading: row[key] for key, heading in _HEADINGS.items()} for row in rows]
     styles = ["bold" if row["chosen"] else "" if row["within"] else "dim" for row in rows]
-    numbers = ("parameter", "ns", "RMSE", "max error")
-    return rich_table(list(shown[0]), shown, title, styles, right=numbers)
+    print_table(list(shown[0]), shown, title, styles, secondary=("RMSE", "within"))

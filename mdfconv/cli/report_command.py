@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import typer
-
 from mdfconv.cli.options import FolderOption, ForceOption
 from mdfconv.cli.outputs import Outputs, check_folder
 from mdfconv.cli.tables import progress
@@ -31,8 +29,5 @@ def command(
             artefacts.append(artefact)
             advance(1)
     present = [name for name in ELSEWHERE if (folder / name).exists()]
-    contents = {
-        folder / name: content for name, content in report_files(artefacts, present).items()
-    }
-    outputs.write(contents)
-    typer.echo("\n".join(map(str, contents)))
+    files = report_files(artefacts, present)
+    outputs.write({folder / name: content for name, content in files.items()})

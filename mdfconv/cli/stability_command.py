@@ -11,6 +11,9 @@ from mdfconv.cli.options import ForceOption, FormatOption, MdfOption, OutputOpti
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 
+# Of a table in a narrow terminal.
+_SECONDARY = ("textbook", "worst", "error_in_eps", "cases", "out_of_range")
+
 
 class Part(StrEnum):
     """The parts of the audit."""
@@ -51,4 +54,5 @@ def command(
     outputs = Outputs(table=output, force=force)
     rows = [asdict(finding) for finding in audit(mdf or (), part)]
     columns = [field.name for field in fields(Finding)]
-    write_table(columns, rows, format_, outputs, title="Hard cases: worst relative errors")
+    title = "Hard cases: worst relative errors"
+    write_table(columns, rows, format_, outputs, title=title, secondary=_SECONDARY)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import io
+import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TextIO
 
 import typer
 
@@ -24,7 +25,9 @@ if TYPE_CHECKING:
 _PIPE_WIDTH = 160
 # Nobody reads more in a terminal, and Rich takes a millisecond a row.
 ROWS_SHOWN = 500
-_WIDEST = 1000
+# Longer words may be broken; text in less than the other is hard to read.
+_LONGEST_WORD, _READABLE = 24, 16
+_LETTER = re.compile(r"[^\W\d_eE]")
 _ENDINGS = {".json": Format.json, ".md": Format.markdown, ".txt": Format.table}
 
 
@@ -53,6 +56,7 @@ def write_table(
     beside: Mapping[Path, bytes] | None = None,
     title: str = "",
     styles: Sequence[str] = (),
+    secondary: Sequence[str] = (),
 ) -> None:
     """Write rows to standard output or to a file, in the form asked for.
 
@@ -72,6 +76,8 @@ def write_table(
         Above a table on a terminal.
     styles : sequence of str
         Rich's style of each row of a table on a terminal.
+    secondary : sequence of str
+        Columns that a narrow terminal leaves out before others, from the last one.
     """
     output = outputs.table if outputs else None
     form = form_of(form, output)
@@ -84,8 +90,7 @@ def write_table(
     if output:
         return
     if form is Format.table:
-        print_table(rich_table(columns, rows[:ROWS_SHOWN], title, styles))
-        tell_rest(len(rows))
+        print_table(columns, rows, title, styles, secondary=secondary)
     else:
         typer.echo(table_text(columns, rows, form))
 
@@ -94,71 +99,155 @@ def table_text(columns: Sequence[str], rows: Sequence[Record], form: Format) -> 
     """Return rows as text in a form."""
     if form is Format.json:
         return json_text([{column: row[column] for column in columns} for row in rows])
-    flat = [{column: _flat(row[column]) for column in columns} for row in rows]
+    if form is Format.table:
+        buffer = io.StringIO()
+        _print(buffer, _columns(columns, rows))
+        return buffer.getvalue().rstrip()
+    number = cell_text if form is Format.markdown else str
+    flat = [{column: _flat(row[column], number) for column in columns} for row in rows]
     if form is Format.csv:
         return csv_text(columns, flat)
     if form is Format.markdown:
         return markdown_text(columns, flat)
-    if form is Format.plain:
-        return "\n".join(" ".join(_plain_cell(row[column]) for column in columns) for row in flat)
-    from rich.console import Console
-
-    buffer = io.StringIO()
-    Console(file=buffer, width=_PIPE_WIDTH).print(rich_table(columns, rows))
-    return buffer.getvalue().rstrip()
+    return "\n".join(" ".join(_plain_cell(row[column]) for column in columns) for row in flat)
 
 
-def rich_table(
+def print_table(
     columns: Sequence[str],
     rows: Sequence[Record],
     title: str = "",
     styles: Sequence[str] = (),
-    right: Sequence[str] = (),
-) -> Any:
-    """Return a table for a terminal; numbers, and the columns named, stand to the right."""
-    from rich import box
+    *,
+    secondary: Sequence[str] = (),
+    err: bool = False,
+    everything: str = "--format csv",
+    count: int | None = None,
+) -> None:
+    """Print the first `ROWS_SHOWN` rows, on a terminal no wider than it is.
+
+    Text wraps, numbers do not; where there is no room for all columns, standard error says which
+    are left out.
+
+    Parameters
+    ----------
+    columns, rows, title, styles
+        As for `write_table`.
+    secondary : sequence of str
+        Columns to leave out before others, from the last one; then the last columns go.
+    err : bool
+        Print to standard error.
+    everything : str
+        The option that shows what is left out.
+    count : int, optional
+        How many rows there are, if these are not all.
+    """
+    stream = sys.stderr if err else sys.stdout
+    shown = rows[:ROWS_SHOWN]
+    table = _columns(columns, shown)
+    kept = _fitting(table, console(err=err).width, secondary) if stream.isatty() else table
+    _print(stream, kept, title, styles)
+    left_out = [column.name for column in table if column not in kept]
+    if left_out:
+        tell(f"too narrow for {', '.join(left_out)}: {everything} has all columns")
+    more = (len(rows) if count is None else count) - len(shown)
+    if more > 0:
+        tell(f"… and {more} more; {everything} has them all")
+
+
+class _Column(NamedTuple):
+    """A column in print: its heading, its cells, and whether they are words, not numbers."""
+
+    name: str
+    cells: list[str]
+    words: bool
+
+    @property
+    def widest(self) -> int:
+        """The width in which nothing wraps."""
+        return max(_width(text) for text in (self.name, *self.cells))
+
+    @property
+    def narrowest(self) -> int:
+        """The least width: numbers stay whole, and words unless they are very long."""
+        pieces = {word for text in self.cells for word in text.split()}
+        unbroken = [
+            min(_width(word), _LONGEST_WORD) if _LETTER.search(word) else _width(word)
+            for word in pieces
+        ]
+        readable = min(self.widest, _READABLE) if self.words else 0
+        return max(readable, *map(_width, self.name.split()), *unbroken)
+
+
+def _width(text: str) -> int:
     from rich.cells import cell_len
+
+    return cell_len(text)
+
+
+def _columns(names: Sequence[str], rows: Sequence[Record]) -> list[_Column]:
+    cells = {name: [row[name] for row in rows] for name in names}
+    return [
+        _Column(
+            name,
+            [cell_text(_flat(cell, cell_text)) for cell in cells[name]],
+            not any(map(_is_number, cells[name])),
+        )
+        for name in names
+    ]
+
+
+def _is_number(cell: Any) -> bool:
+    several = isinstance(cell, list | tuple) and len(cell) > 0
+    return isinstance(cell[0] if several else cell, int | float)
+
+
+def _fitting(table: list[_Column], width: int, secondary: Sequence[str]) -> list[_Column]:
+    """Return the columns for which there is room, at least one."""
+    order = {name: number for number, name in enumerate(secondary)}
+    kept = sorted(table, key=lambda column: order.get(column.name, -1))
+    while len(kept) > 1 and _framed(column.narrowest for column in kept) > width:
+        kept.pop()
+    return [column for column in table if column in kept]
+
+
+def _framed(widths: Iterable[int]) -> int:
+    """Return the width of a table with what stands between and around its columns."""
+    return sum(width + 3 for width in widths) + 1
+
+
+def _print(
+    stream: TextIO, table: list[_Column], title: str = "", styles: Sequence[str] = ()
+) -> None:
+    """Print columns, in the width of a terminal if they can be as narrow."""
+    from rich import box
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, title=title, title_style="bold", title_justify="left")
-    cells = [[cell_text(_flat(row[column])) for column in columns] for row in rows]
-    for number, column in enumerate(columns):
-        text = column not in right and any(isinstance(row[column], str) for row in rows)
-        justify: Literal["left", "right"] = "left" if text else "right"
-        # Rich takes a column that does not wrap for as narrow as its longest word.
-        widest = None if text else max(cell_len(row[number]) for row in [columns, *cells])
-        table.add_column(
-            column, justify=justify, overflow="fold", no_wrap=not text, min_width=widest
-        )
-    for number, row_cells in enumerate(cells):
-        table.add_row(*map(escape, row_cells), style=styles[number] if styles else None)
-    return table
-
-
-def print_table(table: Any, *, err: bool = False) -> None:
-    """Print a Rich table, wider than the terminal rather than with numbers broken."""
-    from rich.console import Console
-
-    out = console(err=err)
-    needed = out.measure(table, options=out.options.update(max_width=_WIDEST)).minimum
-    if needed > out.width:
-        out = Console(stderr=err, width=needed, highlight=False)
-    out.print(table)
-
-
-def tell_rest(count: int, everything: str = "--format csv", shown: int = ROWS_SHOWN) -> None:
-    """Say how many rows a table on a terminal leaves out, and what shows them."""
-    if count > shown:
-        tell(f"… and {count - shown} more; {everything} has them all")
+    out = _console(stream)
+    widths, least = ([getattr(c, name) for c in table] for name in ("widest", "narrowest"))
+    while _framed(widths) > out.width and widths != least:
+        # The widest give way.
+        wide = max(range(len(table)), key=lambda n: widths[n] * (widths[n] > least[n]))
+        widths[wide] -= 1
+    rich = Table(box=box.SIMPLE_HEAD, title=title, title_style="bold", title_justify="left")
+    for column, width in zip(table, widths, strict=True):
+        justify: Literal["left", "right"] = "left" if column.words else "right"
+        rich.add_column(escape(column.name), justify=justify, overflow="fold", width=width)
+    for number, cells in enumerate(zip(*(column.cells for column in table), strict=True)):
+        rich.add_row(*map(escape, cells), style=styles[number] if styles else None)
+    _console(stream, max(out.width, _framed(widths))).print(rich)
 
 
 def console(*, err: bool = False) -> Console:
     """Return a Rich console on standard output or error, wide enough for a table in a pipe."""
+    return _console(sys.stderr if err else sys.stdout)
+
+
+def _console(stream: TextIO, width: int | None = None) -> Console:
     from rich.console import Console
 
-    stream = sys.stderr if err else sys.stdout
-    return Console(stderr=err, width=None if stream.isatty() else _PIPE_WIDTH, highlight=False)
+    usual = None if stream.isatty() else _PIPE_WIDTH
+    return Console(file=stream, width=width or usual, highlight=False)
 
 
 @contextmanager
@@ -173,17 +262,19 @@ def progress(description: str, total: int) -> Iterator[Callable[[int], None]]:
         yield lambda steps: bar.advance(task, steps)
 
 
-def _flat(cell: Any) -> Any:
+def _flat(cell: Any, number: Callable[[Any], str] = str) -> Any:
     """Return a cell as a single value: nothing is empty, several numbers are one text."""
     if cell is None:
         return ""
     if isinstance(cell, Mapping):
-        return "; ".join(f"{key}: {_flat(value)}" for key, value in cell.items())
+        return "; ".join(f"{key}: {_flat(value, number)}" for key, value in cell.items())
     if isinstance(cell, list | tuple):
         if any(isinstance(value, Mapping) for value in cell):
-            return " | ".join(str(_flat(value)) for value in cell)
-        separator = "; " if any(isinstance(value, str) for value in cell) else ","
-        return separator.join(str(value) for value in cell)
+            return " | ".join(str(_flat(value, number)) for value in cell)
+        words = any(isinstance(value, str) for value in cell)
+        # A table may wrap between numbers.
+        separator = "; " if words else "," if number is str else ", "
+        return separator.join(map(number, cell))
     return cell
 
 

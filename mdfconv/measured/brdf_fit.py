@@ -20,6 +20,7 @@ from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.directional import DirectionalSamples
+from mdfconv.measured.lobe_fit import half_width_logarithms
 from mdfconv.measured.projection import (
     Projection,
     log_rmse,
@@ -336,8 +337,7 @@ class _Problem:
         starts = []
         for gamma in gammas:
             target = self._target if gamma is None else self._target.with_gamma(float(gamma))
-            parameters = target.from_half_tangent(tangents)
-            first = np.log(parameters[np.isfinite(parameters)])
+            first = half_width_logarithms(target, tangents)
             for reflectance in _STARTS if self._free_reflectance else (None,):
                 rest = [] if gamma is None else [np.log(gamma)]
                 rest += [] if reflectance is None else [reflectance]

@@ -150,11 +150,11 @@ class _Problem:
         """Return points of every half width for each γ of a grid, shape (candidates, unknowns)."""
         tangents = np.geomspace(_NARROWEST, _WIDEST, _CANDIDATES)
         if self._gamma_range is None:
-            return [_logarithms(self._target.from_half_tangent(tangents))[:, None]]
+            return [half_width_logarithms(self._target, tangents)[:, None]]
         points = []
         for gamma in np.geomspace(*self._gamma_range, _GAMMAS):
             target = self._target.with_gamma(float(gamma))
-            first = _logarithms(target.from_half_tangent(tangents))
+            first = half_width_logarithms(target, tangents)
             points.append(np.stack([first, np.full_like(first, np.log(gamma))], axis=1))
         return points
 
@@ -283,6 +283,19 @@ class _Problem:
         return slopes
 
 
-def _logarithms(candidates: Array) -> Array:
-    """Return the logarithms of those that exist, ascending."""
-    return np.log(np.sort(candidates[np.isfinite(candidates)]))
+def half_width_logarithms(target: Distribution, tangents: Array) -> Array:
+    """Return the logarithms of the parameters for half widths, ascending, of those that exist.
+
+    Raises
+    ------
+    MdfconvError
+        If none does.
+    """
+    parameters = target.from_half_tangent(tangents)
+    existing = np.sort(parameters[np.isfinite(parameters)])
+    if not existing.size:
+        raise MdfconvError(
+            f"{target.name} of γ = {target.gamma:g} has no lobe whose half width can be measured"
+        )
+    logarithms: Array = np.log(existing)
+    return logarithms

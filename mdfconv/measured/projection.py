@@ -12,9 +12,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
 
 # Gauss-Newton steps for the logarithms: at the right parameter six are exact under 50 % of noise.
 _LOG_STEPS, _LOG_TOLERANCE = 12, 1e-11
+# Of the largest sample: what is smaller has no weight 1/value² in double precision.
+_SMALLEST_LOGARITHM = 1e-100
 # Of the smallest sample, under the logarithmic loss: a model is kept positive, far from where a
 # fit ends.
 _SMALLEST_MODEL = 1e-3
@@ -33,6 +36,11 @@ class Projection:
         Of the squared residuals; 1 if not given.
     floor : bool
         Whether an offset is at least 0.
+
+    Raises
+    ------
+    MdfconvError
+        If there are logarithms of values that are too far apart.
     """
 
     def __init__(
@@ -46,6 +54,12 @@ class Projection:
         self.values, self._log, self._floor = values, log, floor
         self._weight = np.ones_like(values) if weight is None else weight * np.ones_like(values)
         self._root = np.sqrt(self._weight)
+        if log and values.min() <= _SMALLEST_LOGARITHM * values.max():
+            raise MdfconvError(
+                "the smallest value is less than 1e-100 of the largest: no loss of logarithms "
+                "holds both",
+                "leave out what is no measurement, or take the linear loss",
+            )
 
     def __call__(self, lobe: Array) -> tuple[Array, Array, Array, Array]:
         """Return residuals, their gain ∂residual/∂model, offsets and scales.

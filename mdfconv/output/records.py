@@ -35,10 +35,12 @@ def csv_text(columns: Sequence[str], rows: Iterable[Record]) -> str:
 
 
 def cell_text(value: Any) -> str:
-    """Return a cell for people: six significant digits, and a mark for yes."""
+    """Return a cell for people: six significant digits, a mark for yes and for no number."""
     if isinstance(value, bool):
         return "✓" if value else ""
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    if not isinstance(value, float):
+        return str(value)
+    return "—" if math.isnan(value) else f"{value:.6g}"
 
 
 def rounded_rows(columns: Mapping[str, Any]) -> list[dict[str, float]]:

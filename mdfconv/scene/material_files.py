@@ -97,6 +97,8 @@ class FileConversion:
     problems : tuple of (int or str, str)
         What is left as it is: where it stands, a line or a path within the file, and what is
         wrong with it.
+    notes : tuple of (int, str)
+        What a careful user must know, and the line that it is about.
     files : mapping of Path to bytes
         What goes beside the result, such as textures.
     inputs : sequence of Path
@@ -105,6 +107,7 @@ class FileConversion:
 
     data: bytes
     problems: tuple[tuple[int | str, str], ...] = ()
+    notes: tuple[tuple[int, str], ...] = ()
     files: Mapping[Path, bytes] = field(default_factory=dict)
     inputs: Sequence[Path] = ()
 

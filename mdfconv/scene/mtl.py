@@ -144,6 +144,7 @@ def convert_mtl(
     _set_textures(texts, content, textures, b"map_" + keywords[1], names, replace=replace)
     return MtlConversion(
         data=b"".join(texts),
+        notes=_replaced(content, texts, keywords[1]),
         materials=tuple(filter(None, materials)),
         textures=textures,
         problems=tuple(problems),
@@ -246,6 +247,17 @@ def _edited(
                 new = last.content + (last.end or default_end) + last.another(keywords[1], result)
             texts[last.number - 1] = new + last.end
     return texts
+
+
+def _replaced(lines: list[Line], texts: list[bytes], keyword: bytes) -> tuple[tuple[int, str], ...]:
+    """Return notes on the values of the target that somebody wrote and that are gone."""
+    return tuple(
+        (line.number, f"{line.keyword.decode()} {line.value.decode(errors='replace')} was replaced")
+        for line, text in zip(lines, texts, strict=True)
+        if line.keyword in (keyword, b"map_" + keyword)
+        and line.value
+        and text != line.content + line.end
+    )
 
 
 def _result(material: Material, keyword: bytes) -> bytes | None:

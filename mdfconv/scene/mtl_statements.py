@@ -49,11 +49,15 @@ class Line(NamedTuple):
     @property
     def content(self) -> bytes:
         """The line without its end."""
-        return self.with_value(self.keyword, self.value)
+        return self.before + self.keyword + self.gap + self.value + self.after
 
     def with_value(self, keyword: bytes, value: bytes) -> bytes:
         """Return the content with another keyword and value, all else kept."""
-        return self.before + keyword + self.gap + value + self.after
+        if self.value:
+            return self.before + keyword + self.gap + value + self.after
+        # A keyword alone, or with a comment close by.
+        comment = self.after and (self.gap or b" ") + self.after
+        return self.before + keyword + b" " + value + comment
 
     def another(self, keyword: bytes, value: bytes) -> bytes:
         """Return the content of a new line like this one: its indentation, not its comment."""

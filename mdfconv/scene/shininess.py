@@ -98,6 +98,8 @@ def error_of(exponent: Array, roughness: Array, metric: Metric) -> Array:
         target.decode(roughness[lobes]),
         metric,
     )
+    # Both are the uniform lobe, whose signal may be nothing that an error is relative to.
+    rmse[(exponent < _LEAST) & (roughness == 1)] = 0.0
     return rmse
 
 
@@ -107,7 +109,8 @@ def fit_error(exponent: Array, metric: Metric) -> Array:
     def error(exponent: Array) -> Array:
         return error_of(exponent, roughness_of(exponent, metric), metric)
 
-    return errors_of_many(error, np.maximum(exponent, _LEAST))
+    errors = errors_of_many(error, np.maximum(exponent, _LEAST))
+    return np.where(exponent < _LEAST, 0.0, errors)
 
 
 # The programs that store a roughness for an exponent, and render it with GGX.

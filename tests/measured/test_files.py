@@ -176,7 +176,7 @@ GOOD = table(BETA_DEGREES, [0.1 + 2 * GGX], "deg,v")
         (GOOD, ("--loss", "cubic"), "'cubic' is not one of"),
         (GOOD, ("--max-angle", "0"), "--max-angle"),
         (GOOD, ("--tolerance", "-1"), "--tolerance"),
-        (GOOD, ("--gamma", "0"), "γ > 0"),
+        (GOOD, ("--gamma", "0"), "1e-06 ≤ γ"),
         (GOOD, ("--angle", "²"), "no column"),
         ("deg,v\n" + "".join(f"{k},{k}\n" for k in range(20)), (), "no lobe to fit"),
         ("#DIM 1 3\n#PARAM_IN COS_TH\n1 1 1 1\n", ("--angle", "2"), "choose no columns"),

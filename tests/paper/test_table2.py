@@ -87,7 +87,7 @@ def test_refitted_coefficients():
 
 def test_output_files(tmp_path):
     path = tmp_path / "table.md"
-    assert run("fit-table", "--output", path) == (0, "", "")
+    assert run("fit-table", "--output", path) == (0, "", f"mdfconv: wrote {path}\n")
     assert path.read_text().startswith("| m_b |")
     assert [entry.name for entry in tmp_path.iterdir()] == ["table.md"]
     status, out, err = run("fit-table", "--output", tmp_path / "no" / "table.csv")

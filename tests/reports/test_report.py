@@ -57,9 +57,9 @@ def compare_text(ours, committed, name, rel):
 
 def test_report_is_the_same_twice(folder, tmp_path):
     # A new interpreter, with an order of sets of its own.
-    status, out, _ = run("report", "--output", tmp_path, PYTHONHASHSEED="1")
+    status, _, err = run("report", "--output", tmp_path, PYTHONHASHSEED="1")
     assert status == 0
-    assert "README.md" in out
+    assert "README.md" in err
     files = [path for path in tmp_path.iterdir() if path.suffix in (".csv", ".md", ".html")]
     assert len(files) > 15
     for path in files:

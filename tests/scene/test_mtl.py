@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import mdfconv
+from mdfconv.cli.tables import ROWS_SHOWN
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.scene import convert_mtl
 from mdfconv.scene.material_files import choose_outputs, write_conversions
@@ -19,6 +20,7 @@ from mdfconv.scene.shininess import (
     IMPORTERS,
     error_of,
     exponent_of,
+    fit_error,
     importer_results,
     roughness_of,
 )
@@ -251,10 +253,13 @@ def test_in_place_keeps_the_original(tmp_path):
     for name in ("a.mtl", "b.mtl"):
         (tmp_path / name).write_bytes(SOURCE)
     (tmp_path / "a.mtl").chmod(0o640)
-    for words, done in (([], "wrote"), ([], "nothing to change in"), (["--replace"], "wrote")):
+    # Each file and its backup.
+    for words, done, count in (
+        ([], "wrote", 4), ([], "nothing to change in", 2), (["--replace"], "wrote", 4),
+    ):  # fmt: skip
         status, _, err = run("mtl", "--in-place", "*.mtl", *words, cwd=tmp_path)
         assert status == 0
-        assert err.count(f"mdfconv: {done} ") == 2
+        assert err.count(f"mdfconv: {done} ") == count
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {f"{x}.mtl{end}" for x in "ab" for end in ("", ".bak", ".bak2")}
     assert (tmp_path / "a.mtl.bak2").read_bytes() == CONVERTED
@@ -321,7 +326,7 @@ def test_the_table_is_whole_on_a_narrow_terminal(tmp_path):
     words = "mtl", tmp_path / "in.mtl", "-o", tmp_path / "out.mtl", "--compare"
     status, out = run_on_terminal(*words, COLUMNS="60")
     assert status == 0
-    for cell in ("chrome", "500.5", "0.222087", "blender-obj", "0.293"):
+    for cell in ("chrome", "500.5", "0.222087", "blender-obj", "0.29254"):
         assert cell in out
 
 
@@ -429,3 +434,83 @@ def test_textures_are_not_written_over_by_accident(tmp_path, force):
     assert status == 2
     assert "x_Pr.png is the input" in err
     assert texture.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("empty", "filled"),
+    [
+        (b"Pr", b"Pr 0.35997397"),
+        (b"\tPr \t", b"\tPr 0.35997397"),
+        (b"Pr#x", b"Pr 0.35997397 #x"),
+        (b"Pr  # x", b"Pr 0.35997397  # x"),
+    ],
+)
+def test_a_statement_without_a_value_gets_one(empty, filled):
+    for end in (b"", b"\n", b"\r\nNs 100\r\n"):
+        for replace in (False, True):
+            found = convert_mtl(
+                b"newmtl a\nNs 100\n" + empty + end, metric="energy", replace=replace
+            )
+            assert filled + end.partition(b"Ns")[0] in found.data
+            assert found.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("empty", "filled"), [(b"map_Pr", b"map_Pr -s 2 2 1 y.png"), (b"map_Pr#x", b"y.png #x")]
+)
+def test_an_empty_statement_of_a_texture_gets_its_name(empty, filled):
+    data = b"newmtl a\nmap_Ns -s 2 2 1 x.png\n" + empty
+    found = convert_mtl(data, texture_names={"x.png": "y.png"})
+    assert found.data.endswith(filled)
+    assert found.notes == ()
+
+
+def test_what_was_written_by_hand_is_noted_where_it_goes(tmp_path):
+    text = "newmtl a\nPr 0.5 # mine\nNs 100\nmap_Ns x.png\nmap_Pr old.png\nnewmtl b\nPr 0.5\n"
+    (tmp_path / "a.mtl").write_text(text)
+    Image.new("L", (2, 2), 30).save(tmp_path / "x.png")
+    status, out, err = run(
+        "mtl", "a.mtl", "-o", "out/", "--textures", "--format", "json", cwd=tmp_path
+    )
+    assert status == 0
+    assert json.loads(out)[0]["notes"] == [
+        {"line": 2, "note": "Pr 0.5 was replaced"},
+        {"line": 5, "note": "map_Pr old.png was replaced"},
+    ]
+    assert "mdfconv: note: a.mtl, line 2: Pr 0.5 was replaced\n" in err
+    assert "mdfconv: note: a.mtl, line 5: map_Pr old.png was replaced\n" in err
+    again = convert_mtl((tmp_path / "out" / "a.mtl").read_bytes())
+    assert again.notes == ()
+    assert convert_mtl(b"newmtl a\nPr 0.5\nNs 10", "shininess").notes == (
+        (3, "Ns 10 was replaced"),
+    )
+
+
+def test_many_notes_are_counted(tmp_path):
+    (tmp_path / "a.mtl").write_text("newmtl a\nNs 100\nPr 0.5\n" * 150)
+    err = run("mtl", "a.mtl", "-o", "b.mtl", cwd=tmp_path)[2]
+    assert err.count("was replaced") == 100
+    assert "… and 50 more notes; --format json has them all" in err
+
+
+@pytest.mark.parametrize("metric", ["unit", "energy", "environment", "display"])
+def test_no_highlight_is_no_error(metric):
+    """Ns 0 and Pr 1 are one lobe, the uniform one."""
+    exponents = np.array([0.0, 1e-9, 1.0])
+    assert fit_error(exponents, metric_named(metric))[:2].tolist() == [0, 0]
+    for result in importer_results(exponents[:1], metric_named(metric))[0]:
+        assert (result.roughness, result.rmse) == (1, 0)
+
+
+def test_only_what_is_shown_is_compared(tmp_path):
+    count = 130
+    (tmp_path / "a.mtl").write_text("".join(f"newmtl m{n}\nNs {n + 1}\n" for n in range(count)))
+    status, _, err = run("mtl", "a.mtl", "-o", "b.mtl", "--compare", cwd=tmp_path)
+    assert status == 0
+    whole = ROWS_SHOWN // len(IMPORTERS)
+    assert err.count(" obj2gltf ") == whole
+    assert "… and 30 more; --format json" in err
+    assert f"… and {(count - whole) * len(IMPORTERS)} more; --format json" in err
+    out = run("mtl", "a.mtl", "-o", "c.mtl", "--compare", "--format", "json", cwd=tmp_path)[1]
+    rows = json.loads(out)[0]["materials"]
+    assert [len(row["importers"]) for row in rows] == [len(IMPORTERS)] * count

@@ -90,7 +90,7 @@ def printed(line, columns, folder, output):
     """Return the lines of tables, and what is said of columns that are left out."""
     output.mkdir()
     status, text = run_on_terminal(
-        *line.format(folder, output).split(), COLUMNS=str(columns), TERM="dumb"
+        *line.format(folder, output).split(), COLUMNS=str(columns), LINES="50", TERM="dumb"
     )
     assert status == 0, text
     text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", text).replace("\r\n", "\n")

@@ -12,6 +12,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from concurrent.futures import ProcessPoolExecutor
 from typing import TypeAlias
 
+from mdfconv.fitting.metrics import list_metrics
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import markdown_text
 from mdfconv.reports import paper_pages
@@ -31,7 +32,7 @@ _ARTEFACTS: Mapping[_Make, tuple[str, ...]] = {
     paper_pages.table2: ("table2.csv", "table2.md"),
     paper_pages.other_metrics: tuple(
         f"table2-{metric}.{end}"
-        for metric in ("energy", "display", "environment")
+        for metric in list_metrics()[1:]
         for end in ("csv", "md")
     ),
     paper_pages.closed_forms: ("closed-forms.csv", "closed-forms.md"),

@@ -31,9 +31,7 @@ _Make: TypeAlias = Callable[[], Artefact]
 _ARTEFACTS: Mapping[_Make, tuple[str, ...]] = {
     paper_pages.table2: ("table2.csv", "table2.md"),
     paper_pages.other_metrics: tuple(
-        f"table2-{metric}.{end}"
-        for metric in list_metrics()[1:]
-        for end in ("csv", "md")
+        f"table2-{metric}.{end}" for metric in list_metrics()[1:] for end in ("csv", "md")
     ),
     paper_pages.closed_forms: ("closed-forms.csv", "closed-forms.md"),
     paper_pages.error_figures: ("fig1.png", "fig1b.csv", "fig2.png", "fig2b.csv", "errors.md"),

@@ -153,7 +153,7 @@ def cheapest(problem: Problem, tolerance: float) -> Formula:
         raise MdfconvError(f"a tolerance is positive, not {tolerance:g}")
     if tolerance < _LEAST_TOLERANCE:
         raise MdfconvError(
-            f"a tolerance is at least {_LEAST_TOLERANCE:g}, about what single precision rounds, "
+            f"a tolerance is at least {_LEAST_TOLERANCE:.3g}, about what single precision rounds, "
             f"not {tolerance:g}"
         )
     best: Formula | None = None

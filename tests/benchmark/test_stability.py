@@ -232,7 +232,11 @@ def test_command():
 
 def test_output_file(tmp_path):
     path = tmp_path / "hard.md"
-    assert run("stability", "--mdf", "schlick", "--output", path) == (0, "", "")
+    assert run("stability", "--mdf", "schlick", "--output", path) == (
+        0,
+        "",
+        f"mdfconv: wrote {path}\n",
+    )
     assert path.read_text().startswith("| distribution | rule | regime | dtype |")
     assert "edge of support" in path.read_text()
 

@@ -168,7 +168,8 @@ def test_compare(tmp_path):
     assert status == 0
     (record,) = json.loads(out)
     assert record["conversion"] == "fit display (picture)"
-    assert (folder / "compare-m_b-0.2.png").exists()
+    name = "compare-m_b-0.2-ggx-fit-display-4-cook-torrance-area-unit-form-exposure-4.png"
+    assert (folder / name).exists()
 
 
 def test_a_distant_light_shows_a_metal_in_one_color():
@@ -212,11 +213,12 @@ def test_compare_a_material(tmp_path):
     assert status == 0
     (record,) = json.loads(out)
     assert record["distribution"] == "smoothie"
-    with Image.open(tmp_path / "compare-m_b-0.2.png") as picture:
+    (sheet,) = tmp_path.glob("compare-m_b-0.2-smoothie-*.png")
+    with Image.open(sheet) as picture:
         pixels = np.asarray(picture.convert("RGB")).astype(int)
     # Copper is red; the sheet around it, and a grey material, are not.
     assert (pixels[..., 0] - pixels[..., 2]).max() > 40
-    section = list(csv.DictReader((tmp_path / "compare-m_b-0.2.csv").read_text().splitlines()))
+    section = list(csv.DictReader(sheet.with_suffix(".csv").read_text().splitlines()))
     assert max(float(row["beckmann"]) for row in section) == pytest.approx(1, abs=1e-3)
 
 
@@ -225,6 +227,6 @@ def test_a_sheet_shows_the_pixels_asked_for(tmp_path):
         "compare", "--m-b", 0.2, "--mdf", "ggx", "--size", 400, "--dpi", 100, "--output", tmp_path
     )
     assert status == 0
-    with Image.open(tmp_path / "compare-m_b-0.2.png") as picture:
+    with Image.open(tmp_path / "compare-m_b-0.2-ggx.png") as picture:
         assert picture.size[0] > 800
         assert picture.size[1] > 1200

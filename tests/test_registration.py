@@ -76,7 +76,7 @@ COMMANDS = {
         "fit", "--no-png", "--output", ".",
     ],
     "compare": [
-        "compare", "--m-b", 0.2, "--mdf", "cubic-slope", "--method", "fit", "--metric", "root",
+        "compare", 0.2, "--to", "cubic-slope", "--method", "fit", "--metric", "root",
         "--size", 32, "--dpi", 40, "--output", ".",
     ],
     "recommend": ["recommend", "--from", "cubic-slope", 0.2, "--format", "csv"],

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
-from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,19 +16,21 @@ from mdfconv.cli.options import (
     DpiOption,
     FolderOption,
     ForceOption,
+    Format,
     FormatOption,
-    MdfOption,
     MethodOption,
+    asked_endpoint,
     chosen_metric,
 )
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
-from mdfconv.cli.tables import write_table
-from mdfconv.distributions import one_parameter_distribution
+from mdfconv.cli.tables import form_of, tell, write_table
 from mdfconv.errors import MdfconvError
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text
+from mdfconv.registry import ALL
 
 if TYPE_CHECKING:
+    from mdfconv.conversion.endpoint import Endpoint
     from mdfconv.render.comparison import Rule, Scene
 
 _COLUMNS = (
@@ -39,6 +41,8 @@ _COLUMNS = (
 
 # As `mdfconv.render.comparison` has it, which takes long to import.
 _REFERENCE = "beckmann"
+# What the page shows if nothing is said.
+_ON_PAGE = "ggx"
 
 
 class Light(StrEnum):
@@ -59,13 +63,33 @@ class Brdf(StrEnum):
 
 
 def command(
-    m_b: Annotated[
+    values: Annotated[
         list[float] | None,
-        typer.Option(
-            "--m-b", metavar="M", help="Beckmann's m_B; repeatable; default 0.4 and 0.04464."
+        typer.Argument(
+            metavar="[VALUE]...",
+            help="Parameters of the source; of beckmann 0.4 and 0.04464 if not given.",
+            show_default=False,
         ),
     ] = None,
-    mdf: MdfOption = None,
+    source: Annotated[
+        str,
+        typer.Option(
+            "--from",
+            metavar="MDF",
+            autocompletion=completion.endpoints,
+            help="Distribution, or stored form such as ggx:roughness, that the pictures are "
+            "compared with.",
+        ),
+    ] = _REFERENCE,
+    targets: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--to",
+            metavar="MDF",
+            autocompletion=completion.targets,
+            help="What takes its place, as for --from; repeatable; the paper's if not given.",
+        ),
+    ] = None,
     method: MethodOption = None,
     metric: Annotated[
         str | None,
@@ -77,7 +101,7 @@ def command(
         float,
         typer.Option(
             metavar="E",
-            help="Exposure: 1 displays the peak of Beckmann, or its brightest channel, as white.",
+            help="Exposure: 1 displays the source's peak, or its brightest channel, as white.",
         ),
     ] = 1.0,
     light: Annotated[Light, typer.Option(help="A directional light or a square one.")] = (
@@ -101,19 +125,10 @@ def command(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Write a page with sliders instead, for the first --mdf, which may be a stored "
-            "form; ggx if not given. Pictures, too, only with --output.",
+            help="Write a page with sliders instead, from the first VALUE and for the first --to. "
+            "Pictures, too, only with --output.",
         ),
     ] = None,
-    source: Annotated[
-        str,
-        typer.Option(
-            "--from",
-            metavar="MDF",
-            autocompletion=completion.endpoints,
-            help="What the page converts from.",
-        ),
-    ] = _REFERENCE,
     dpi: DpiOption = 120,
     output: FolderOption = None,
     force: ForceOption = False,
@@ -121,13 +136,14 @@ def command(
 ) -> None:
     """Render a sphere with one distribution put in another's place: Figures 3 to 5.
 
-    Writes a contact sheet (fig4.png, fig5.png) and the luminance through the highlight (CSV);
-    names say what differs from the paper's figures, such as fig4-gold.png.
-    Prints RMSE and PSNR against Beckmann, in linear light and as displayed, and the ratios of
-    peak and total energy; of a metal over all three channels, and the luminance is that of its
-    colour. Without --material F is Schlick's for a grey dielectric of index 1.5. A distant light
-    meets the whole sphere with one F, but for modified-phong, which takes it at the viewer's
-    angle: there and under an area light plastics differ, metals everywhere.
+    Writes a contact sheet (fig4.png, fig5.png) and the luminance through the highlight (CSV): the
+    pictures, enlarged where the highlight is small, and how much brighter or darker each is
+    displayed. Names say what differs from the paper's figures, such as fig4-gold.png. Prints RMSE
+    and PSNR against the source, in linear light and as displayed, and the ratios of peak and total
+    energy; of a metal over all three channels, and the luminance is that of its colour. Without
+    --material F is Schlick's for a grey dielectric of index 1.5. A distant light meets the whole
+    sphere with one F, but for modified-phong, which takes it at the viewer's angle: there and
+    under an area light plastics differ, metals everywhere.
 
     The distribution goes into the Smoothie article's exact form (smoothie, D F/(h.h)), its
     approximate one (smoothie-approx, half angle by the length of h in the surface, no G), or
@@ -140,56 +156,57 @@ def command(
 
     mdfconv compare
 
-    mdfconv compare --m-b 0.2 --mdf ggx --light area --exposure 4
+    mdfconv compare --from blinn-phong --to ggx 100
 
-    mdfconv compare --m-b 0.1 --method fit --metric display --brdf cook-torrance --size 512
+    mdfconv compare --to ggx:roughness --light area --exposure 4 0.2
 
-    mdfconv compare --m-b 0.3 --material gold --brdf smoothie
+    mdfconv compare --from ggx:roughness --method fit --metric display --size 512 0.3
 
-    mdfconv compare --from blinn-phong --mdf ggx:roughness --html page.html
+    mdfconv compare 0.3 --material gold --brdf smoothie
+
+    mdfconv compare --from blinn-phong --to ggx:roughness --html page.html
     """
-    outputs = Outputs(html, force=force)
-    page = partial(_page, source, (mdf or ["ggx"])[0], m_b)
-    if html is not None and output is None:
-        outputs.write({html: page()})
-        return
-    from mdfconv.paper.error_curves import DRAWN
-    from mdfconv.render.comparison import PAPER_FIGURES, Scene, compare
+    from mdfconv.render.comparison import Scene, compare
     from mdfconv.render.comparison_figure import draw_comparison
+    from mdfconv.render.page import comparison_page
 
-    if html is None and source != _REFERENCE:
-        raise MdfconvError(f"pictures are compared with {_REFERENCE}", "--from goes with --html")
+    outputs = Outputs(html, force=force)
+    end = asked_endpoint(source)
+    ends = _targets(end, targets or [])
+    contents: dict[Path, bytes] = {}
+    if html is not None:
+        shown = ends[0] if targets else _on_page(ends)
+        contents[html] = comparison_page(end, shown, values[0] if values else None)
+        if output is None:
+            outputs.write(contents)
+            return
     rules = _rules(method, metric, exposure)
-    names = list(dict.fromkeys(one_parameter_distribution(name).name for name in mdf or DRAWN))
+    surfaces = _surfaces(end, values)
+    if _takes_every(targets):
+        ends = _answering(surfaces.values(), rules, end, ends)
     scene = Scene(brdf.value, light.value, normalized, exposure, size, material)
-    given = {f"compare-m_b-{value_name(value)}": value for value in m_b or ()}
-    figures = {
-        _figure_name(start, scene, rules, names): value
-        for start, value in (given or PAPER_FIGURES).items()
-    }
+    words = _words(scene, rules, targets or [])
+    figures = {"-".join([start, *words]): value for start, value in surfaces.items()}
     folder = check_folder(output)
-    outputs.check(*(folder / f"{name}.{end}" for name in figures for end in ("csv", "png")))
+    outputs.check(*(folder / f"{name}.{kind}" for name in figures for kind in ("csv", "png")))
     rows: list[dict[str, Any]] = []
-    contents = {html: page()} if html else {}
     for name, value in figures.items():
-        comparison = compare(value, rules, scene, names)
+        comparison = compare(value, rules, scene, end, ends)
         rows += [{"figure": name} | row for row in comparison.table()]
         columns, section = comparison.section_rows()
         contents[folder / f"{name}.csv"] = file_bytes(csv_text(columns, section))
         contents[folder / f"{name}.png"] = draw_comparison(comparison, dpi)
     outputs.write(contents)
-    write_table(_COLUMNS, rows, format_, title="Pictures against Beckmann's")
+    form = form_of(format_)
+    write_table(_COLUMNS, _shown(rows, ends, form), form, title=_title(end, figures.values()))
 
 
-def _figure_name(start: str, scene: Scene, rules: Sequence[Rule], names: Sequence[str]) -> str:
-    """Return the name of a figure: a word for all that is not as usual but the number of pixels."""
+def _words(scene: Scene, rules: Sequence[Rule], targets: Sequence[str]) -> list[str]:
+    """Return words for names of files: for all that is not as usual but the number of pixels."""
     from mdfconv.conversion import method_named
-    from mdfconv.paper.error_curves import DRAWN
     from mdfconv.render.comparison import Scene, default_rules
 
-    usual, words = Scene(), [start]
-    if tuple(names) != DRAWN:
-        words += names
+    usual, words = Scene(), list(targets)
     if [rule.label for rule in rules] != [rule.label for rule in default_rules(scene.exposure)]:
         for rule in rules:
             kept = [str(rule.metric)] if method_named(rule.method).follows_metric else []
@@ -205,18 +222,79 @@ def _figure_name(start: str, scene: Scene, rules: Sequence[Rule], names: Sequenc
         )
         if differs
     ]
-    # A metric can name a file, which may stand in a folder.
-    return re.sub(r"[^\w.+-]+", "-", "-".join(words))
+    # A metric can name a file, which may stand in a folder, and a form has a colon.
+    return [re.sub(r"[^\w.+-]+", "-", word) for word in words]
 
 
-def _page(source: str, target: str, m_b: list[float] | None) -> bytes:
-    from mdfconv.conversion.endpoint import endpoint
-    from mdfconv.render.page import comparison_page
+def _takes_every(targets: list[str] | None) -> bool:
+    return any(name.strip().lower() == ALL for name in targets or ())
 
-    ends = endpoint(source), endpoint(target)
-    if m_b and ends[0].distribution.name != _REFERENCE:
-        raise MdfconvError(f"--m-b is the parameter of {_REFERENCE}, not of {ends[0].label}")
-    return comparison_page(*ends, m_b[0] if m_b else None)
+
+def _targets(source: Endpoint, names: list[str]) -> list[Endpoint]:
+    """Return what takes the source's place: what is named, or the paper's other distributions."""
+    from mdfconv.conversion.endpoint import one_parameter_endpoint
+    from mdfconv.distributions import one_parameter_distributions
+    from mdfconv.paper.error_curves import PAPER_SETS
+
+    if names and not _takes_every(names):
+        ends = [asked_endpoint(name) for name in names]
+        return list({end.label: end for end in ends}.values())
+    others = (
+        [mdf.name for mdf in one_parameter_distributions()] if names else list(PAPER_SETS["fig1"])
+    )
+    return [one_parameter_endpoint(name) for name in others if name != source.distribution.name]
+
+
+def _answering(
+    values: Iterable[float], rules: Sequence[Rule], source: Endpoint, ends: list[Endpoint]
+) -> list[Endpoint]:
+    """Return the targets to which all values can be converted; say why the others are left out."""
+    from mdfconv.conversion import convert
+
+    refusals: dict[str, MdfconvError] = {}
+    for end in ends:
+        try:
+            for value, rule in product(values, rules):
+                end.decode_one(convert(value, source, end, rule.method, metric=rule.metric))
+        except MdfconvError as error:
+            refusals[end.label] = error
+    if len(refusals) == len(ends):
+        raise next(iter(refusals.values()))
+    for refusal in refusals.values():
+        tell(f"left out: {refusal}")
+    return [end for end in ends if end.label not in refusals]
+
+
+def _surfaces(source: Endpoint, values: list[float] | None) -> Mapping[str, float]:
+    """Return the surfaces by the names of their files: the paper's, if none is asked for."""
+    from mdfconv.render.comparison import PAPER_FIGURES
+
+    if values:
+        stem = f"compare-{source.label.replace(':', '-')}"
+        return {f"{stem}-{value_name(value)}": value for value in values}
+    if source.label != _REFERENCE:
+        raise MdfconvError(
+            f"the {source.stored.name} {source.stored.symbol} of {source.label} is missing",
+            "give it as VALUE",
+        )
+    return PAPER_FIGURES
+
+
+def _title(source: Endpoint, values: Iterable[float]) -> str:
+    shown = " and ".join(map(source.text, values))
+    return f"Pictures against those of {source.label}, {shown}"
+
+
+def _shown(rows: list[dict[str, Any]], ends: Sequence[Endpoint], form: Format) -> Any:
+    """Return the rows for a form: on a terminal parameters have their symbols."""
+    if form is not Format.table:
+        return rows
+    texts = {end.label: end.text for end in ends}
+    return [row | {"parameter": texts[row["distribution"]](row["parameter"])} for row in rows]
+
+
+def _on_page(ends: list[Endpoint]) -> Endpoint:
+    return next((end for end in ends if end.label == _ON_PAGE), ends[0])
 
 
 def _rules(method: str | None, metric: str | None, exposure: float) -> list[Rule]:

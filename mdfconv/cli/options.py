@@ -11,10 +11,12 @@ import typer
 
 from mdfconv.cli import completion
 from mdfconv.cli.numbers import percent_hint
+from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
     from mdfconv.conversion.arrays import Gamma
+    from mdfconv.conversion.endpoint import Endpoint
     from mdfconv.fitting.metrics import Metric
 
 # Of a page a hundred million pixels, a third of a gigabyte.
@@ -166,6 +168,24 @@ def refuse_given(context: typer.Context, names: Collection[str], why: str) -> No
         source = context.get_parameter_source(option.name or "")
         if option.name in names and source is not None and source.name == "COMMANDLINE":
             raise MdfconvError(f"{option.opts[0]} {why}")
+
+
+def asked_endpoint(name: str) -> Endpoint:
+    """Return the distribution of one parameter and its form that an option names.
+
+    What to know of the name goes to standard error.
+
+    Raises
+    ------
+    MdfconvError
+        As `one_parameter_endpoint`.
+    """
+    from mdfconv.conversion.endpoint import one_parameter_endpoint
+
+    end = one_parameter_endpoint(name)
+    if end.caution:
+        tell(f"note: {end.caution}")
+    return end
 
 
 def chosen_metric(name: str, exposure: float | None = None) -> Metric:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mdfconv.distributions import Distribution, distribution
+from mdfconv.distributions import Distribution, distribution, one_parameter_distribution
 from mdfconv.distributions.dialects import DIALECTS, Specular, dialects_of
 from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.distributions.parameter import Encoding, Parameter
@@ -46,6 +46,15 @@ class Endpoint:
     def stored(self) -> Parameter:
         """Name, symbol and ranges of the number that the user gives or gets."""
         return self.encoding.stored if self.encoding else self.distribution.parameter
+
+    def text(self, value: float) -> str:
+        """Return the number that the user gives or gets behind its symbol, as in ``"α 0.2"``."""
+        # Without an exponent, which the second rounding does.
+        return f"{self.stored.symbol} {float(f'{value:.4g}'):.10g}"
+
+    def decode_one(self, value: float) -> float:
+        """Return the parameter for a single stored value; raise if it is illegal."""
+        return float(self.decode(self.stored.check_one(value, self.label)))
 
     def decode(self, values: ArrayLike) -> Array:
         """Return the parameters (float64) for stored values; raise if one is illegal."""
@@ -152,6 +161,19 @@ def endpoint(name: str | Endpoint) -> Endpoint:
     if colon:
         return Endpoint(owner, _encoding(owner, tail))
     return Endpoint(owner, caution=owner.ambiguous.get(head.strip().lower(), ""))
+
+
+def one_parameter_endpoint(name: str | Endpoint) -> Endpoint:
+    """Return the endpoint for a name, as `endpoint`.
+
+    Raises
+    ------
+    MdfconvError
+        As `endpoint`, and if the distribution only makes a difference for pairs of parameters.
+    """
+    end = endpoint(name)
+    one_parameter_distribution(end.distribution.name)
+    return end
 
 
 def _owner(name: str) -> Distribution:

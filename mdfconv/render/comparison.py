@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,15 +14,23 @@ from mdfconv.brdf.materials import material
 from mdfconv.brdf.microsurface import Microsurface
 from mdfconv.brdf.reflection import BRDFS
 from mdfconv.conversion import convert, method_named
-from mdfconv.distributions import distribution
+from mdfconv.conversion.endpoint import Endpoint, one_parameter_endpoint
+from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
-from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.metrics.display import srgb
 from mdfconv.output.records import rounded_rows
 from mdfconv.paper.error_curves import DRAWN, PAPER_SETS, lobe_extent
-from mdfconv.render.sphere import LIGHTS, Frame, cross_section, radiance
+from mdfconv.render.sphere import (
+    LIGHTS,
+    MARGIN,
+    Frame,
+    cross_section,
+    highlight,
+    highlight_extent,
+    radiance,
+)
 
 _SECTION_POINTS = 401
 _SIZES = (16, 4096)  # pixels a side: from where the sphere shows up to what memory holds
@@ -32,7 +40,7 @@ _REC_709 = np.array([0.2126, 0.7152, 0.0722])  # luminance of linear R, G, B (IT
 _LEAST_PEAK = 0.5
 # A difference of less than this is the rounding of the conversion: 200 dB.
 _LEAST_RMSE = 1e-10
-# The distribution that the others stand for: the first of the paper's sets.
+# The distribution that the paper's others stand for: the first of its sets.
 REFERENCE = next(iter(PAPER_SETS["fig1"]))
 # Sawicki 2021, captions of Figures 4 and 5: the surfaces of Figures 1 and 2.
 PAPER_FIGURES = {"fig4": PAPER_SETS["fig1"][REFERENCE], "fig5": PAPER_SETS["fig2"][REFERENCE]}
@@ -79,10 +87,10 @@ class Scene:
         if not (np.isfinite(self.exposure) and self.exposure > 0):
             raise MdfconvError("the exposure is a positive number")
 
-    def surface(self, name: str, parameter: float) -> Brdf:
+    def surface(self, mdf: Distribution, parameter: float) -> Brdf:
         """Return the BRDF with a distribution put in."""
         fresnel = material(self.material).fresnel if self.material else schlick_fresnel
-        facets = Microsurface(distribution(name), parameter, self.normalized)
+        facets = Microsurface(mdf, parameter, self.normalized)
         return BRDFS[self.brdf](facets, fresnel)
 
 
@@ -120,28 +128,45 @@ def default_rules(exposure: float) -> list[Rule]:
 
 @dataclass(frozen=True)
 class Rendering:
-    """One distribution's picture.
+    """One surface's picture.
 
     Parameters
     ----------
-    name : str
-        The distribution.
-    parameter : float
-        Its parameter.
+    end : Endpoint
+        The distribution and the form of its parameter.
+    value : float
+        The parameter in that form.
     image : numpy.ndarray, shape (size, size), or (3, size, size) in colour
         Linear light, relative to the reference's peak, in colour that of its brightest channel.
+    closeup : numpy.ndarray
+        The highlight alone, in the shape of the image; the image itself where it is large.
     section : numpy.ndarray, shape (n,)
         Luminance along the line through the highlight, relative to the reference's peak.
     """
 
-    name: str
-    parameter: float
+    end: Endpoint
+    value: float
     image: Array
+    closeup: Array
     section: Array
+
+    @property
+    def name(self) -> str:
+        """The distribution and the form of its parameter, as the user writes it."""
+        return self.end.label
+
+    @property
+    def value_text(self) -> str:
+        """The parameter behind its symbol."""
+        return self.end.text(self.value)
 
     def displayed(self, exposure: float) -> Array:
         """Return the picture as a screen shows it, encoded, in [0, 1]."""
         return srgb(exposure * self.image)
+
+    def displayed_closeup(self, exposure: float) -> Array:
+        """Return the highlight as a screen shows it."""
+        return srgb(exposure * self.closeup)
 
 
 @dataclass(frozen=True)
@@ -158,12 +183,20 @@ class Comparison:
         From rules in words to the substitutes' pictures.
     position : numpy.ndarray, shape (n,)
         Of the section, in radii.
+    frame : Frame
+        What the close-ups show.
     """
 
     scene: Scene
     reference: Rendering
     rows: Mapping[str, Sequence[Rendering]]
     position: Array
+    frame: Frame
+
+    @property
+    def magnification(self) -> int:
+        """How many times the close-ups enlarge the pictures; 1 where they are the same."""
+        return round(MARGIN / self.frame.half)
 
     def table(self) -> list[dict[str, Any]]:
         """Return for each picture its parameter and how far it is from the reference."""
@@ -172,7 +205,7 @@ class Comparison:
             {
                 "conversion": rule,
                 "distribution": substitute.name,
-                "parameter": substitute.parameter,
+                "parameter": substitute.value,
             }
             | self._errors(substitute, displayed)
             for rule, renderings in self.rows.items()
@@ -192,6 +225,19 @@ class Comparison:
             "energy_ratio": float(image.sum() / reference.sum()),
         }
 
+    def difference(self, substitute: Rendering) -> Array:
+        """Return how much brighter a substitute's close-up is displayed, in [−1, 1].
+
+        In colour it is the difference of the channel that differs most, so that 0 is equal.
+        """
+        exposure = self.scene.exposure
+        ours = self.reference.displayed_closeup(exposure)
+        difference = substitute.displayed_closeup(exposure) - ours
+        if difference.ndim == 2:
+            return difference
+        largest = np.abs(difference).argmax(axis=0)
+        return np.take_along_axis(difference, largest[None], axis=0)[0]
+
     def section_rows(self) -> tuple[list[str], list[dict[str, float]]]:
         """Return the cross-section as columns and rows: position, then luminances."""
         columns = {"position_radii": self.position, self.reference.name: self.reference.section}
@@ -200,64 +246,100 @@ class Comparison:
         return list(columns), rounded_rows(columns)
 
 
+@dataclass(frozen=True)
+class _Surface:
+    """A distribution and its parameter, in the form that the user has and as it is."""
+
+    end: Endpoint
+    value: float
+
+    @property
+    def lobe(self) -> tuple[Distribution, float]:
+        return self.end.distribution, self.end.decode_one(self.value)
+
+
 def compare(
-    parameter: float, rules: Sequence[Rule], scene: Scene, names: Sequence[str] = DRAWN
+    value: float,
+    rules: Sequence[Rule],
+    scene: Scene,
+    source: str | Endpoint = REFERENCE,
+    targets: Sequence[str | Endpoint] = DRAWN,
 ) -> Comparison:
-    """Render the reference, which is Beckmann as in the paper, and its substitutes.
+    """Render a surface and its substitutes.
 
     Parameters
     ----------
-    parameter : float
-        The reference's parameter.
+    value : float
+        The parameter of the surface, in the form in which the source stores it.
     rules : sequence of Rule
         How it is converted.
     scene : Scene
         What is rendered.
-    names : sequence of str
-        The substitutes.
+    source, targets : str or Endpoint
+        The surface's distribution and those that take its place, as `convert` takes them; as in
+        the paper if not given.
 
     Raises
     ------
     MdfconvError
         If a conversion has no answer or the highlight is too small to be seen.
     """
-    legal = distribution(REFERENCE).parameter.check_one(parameter, REFERENCE)
+    reference = _Surface(one_parameter_endpoint(source), float(value))
+    mdf, parameter = reference.lobe
+    ends = [one_parameter_endpoint(target) for target in targets]
     converted = {
         rule.label: [
-            (name, float(convert(legal, REFERENCE, name, rule.method, metric=rule.metric)))
-            for name in names
+            _Surface(
+                end, float(convert(value, reference.end, end, rule.method, metric=rule.metric))
+            )
+            for end in ends
         ]
         for rule in rules
     }
-    extent = float(lobe_extent(distribution(REFERENCE), np.asarray(legal)))
+    extent = highlight_extent(float(lobe_extent(mdf, np.asarray(parameter))), LIGHTS[scene.light])
+    frame = _closeup_frame(extent, scene.size)
     position, normals = cross_section(_SECTION_POINTS, min(extent, 1.0))
-    substitutes = [pair for pairs in converted.values() for pair in pairs]
-    rendered = _render([(REFERENCE, legal), *substitutes], scene, normals)
-    relative = _scale(rendered[REFERENCE, legal])
-    shown = {pair: relative(one) for pair, one in rendered.items()}
-    rows = {label: [shown[pair] for pair in pairs] for label, pairs in converted.items()}
-    return Comparison(scene, shown[REFERENCE, legal], rows, position)
+    substitutes = [surface for surfaces in converted.values() for surface in surfaces]
+    rendered = _render([reference, *substitutes], scene, normals, frame)
+    relative = _scale(rendered[reference])
+    shown = {surface: relative(one) for surface, one in rendered.items()}
+    rows = {label: [shown[one] for one in surfaces] for label, surfaces in converted.items()}
+    return Comparison(scene, shown[reference], rows, position, frame)
+
+
+def _closeup_frame(extent: float, size: int) -> Frame:
+    """Return what shows a highlight alone, or the sphere where that is no larger."""
+    enlarged = int(MARGIN / np.sin(min(extent, 0.5 * np.pi)))
+    return Frame(size, highlight(), MARGIN / enlarged) if enlarged > 1 else Frame(size)
 
 
 def _render(
-    surfaces: Iterable[tuple[str, float]], scene: Scene, normals: Array
-) -> dict[tuple[str, float], Rendering]:
-    """Return pictures and sections by distribution and parameter, not yet relative to a peak.
+    surfaces: Sequence[_Surface], scene: Scene, normals: Array, closeup: Frame
+) -> dict[_Surface, Rendering]:
+    """Return pictures and sections by surface, the reference first, not yet relative to a peak.
 
-    All are drawn at once, as the directions are the same for all; and each but once.
+    All are drawn at once, as the directions are the same for all; and each lobe but once.
     """
-    distinct = list(dict.fromkeys(surfaces))
-    brdfs = [scene.surface(*pair) for pair in distinct]
+    lobes = {surface: surface.lobe for surface in surfaces}
+    numbers = {lobe: number for number, lobe in enumerate(dict.fromkeys(lobes.values()))}
+    brdfs = [scene.surface(*lobe) for lobe in numbers]
 
     def side_by_side(toward: Array, view: Array) -> Array:
         return np.stack([brdf(toward, view) for brdf in brdfs])
 
-    light = LIGHTS[scene.light]
-    images = Frame(scene.size).render(side_by_side, light)
+    mdf, parameter = lobes[surfaces[0]]
+    light = LIGHTS[scene.light].resolved(float(mdf.half_width(parameter)))
+    whole = Frame(scene.size)
+    images = whole.render(side_by_side, light)
+    closeups = images if closeup == whole else closeup.render(side_by_side, light)
     sections = radiance(normals, side_by_side, light)
     return {
-        pair: Rendering(*pair, image, section)
-        for pair, image, section in zip(distinct, images, sections, strict=True)
+        surface: Rendering(
+            surface.end,
+            surface.value,
+            *(pictures[numbers[lobe]] for pictures in (images, closeups, sections)),
+        )
+        for surface, lobe in lobes.items()
     }
 
 
@@ -270,9 +352,8 @@ def _scale(reference: Rendering) -> Callable[[Rendering], Rendering]:
         If the picture misses the peak.
     """
     if reference.image.max() < _LEAST_PEAK * reference.section.max():
-        symbol = distribution(reference.name).parameter.symbol
         raise MdfconvError(
-            f"the highlight of {reference.name} {symbol} = {number_text(reference.parameter)} "
+            f"the highlight of {reference.name} {reference.value_text} "
             "falls between the pixels of the picture",
             "a larger picture shows it",
             argument="size",
@@ -284,6 +365,7 @@ def _scale(reference: Rendering) -> Callable[[Rendering], Rendering]:
     return lambda rendering: replace(
         rendering,
         image=rendering.image / peak,
+        closeup=rendering.closeup / peak,
         section=_luminance(rendering.section) / brightest,
     )
 

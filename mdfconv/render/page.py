@@ -29,21 +29,20 @@ def comparison_page(source: Endpoint, target: Endpoint, start: float | None = No
     Parameters
     ----------
     source : Endpoint
-        The distribution that is converted; its parameter itself.
+        The distribution that is converted. The page shows its parameter itself.
     target : Endpoint
         What it is converted to, in the form that the page shows first.
     start : float, optional
-        The source's parameter that the page shows first; its typical one if not given.
+        What the page shows first, in the form in which the source stores it; the typical
+        parameter if not given.
 
     Raises
     ------
     MdfconvError
-        If the source is a stored form, the start is outside the typical range, or there is no
-        conversion.
+        If the start is illegal or outside the typical range, or there is no conversion.
     """
-    if source.encoding:
-        raise MdfconvError(f"the page starts from {source.distribution.name}, in no stored form")
-    return filled(page_data(source, target, start))
+    parameter = None if start is None else source.decode_one(start)
+    return filled(page_data(Endpoint(source.distribution), target, parameter))
 
 
 def page_data(source: Endpoint, target: Endpoint, start: float | None = None) -> dict[str, Any]:

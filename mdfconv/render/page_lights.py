@@ -40,7 +40,7 @@ def lights(source: Distribution) -> list[dict[str, Any]]:
 def _light(name: str, light: Lights, source: Distribution) -> dict[str, Any]:
     half = half_vector(light.directions, VIEW)
     some = source.parameter.typical_value
-    surface = Scene().surface(source.name, some)
+    surface = Scene().surface(source, some)
     weights = [
         radiance(normal[None, :], surface, Lights(toward[None, :], irradiance[None]))[0]
         for normal, toward, irradiance in zip(half, light.directions, light.irradiance, strict=True)
@@ -61,7 +61,7 @@ def _peak(source: Distribution, parameter: float, light: Lights, half: Array) ->
     """Return the maximum of the picture, on the section through the highlight or in a sample."""
     width = min(4 * float(source.peak_alpha(parameter)), 1.0)
     normals = np.concatenate([cross_section(_SECTION_POINTS, width)[1], half])
-    surface = Scene().surface(source.name, parameter)
+    surface = Scene().surface(source, parameter)
     return float(radiance(normals, surface, light).max())
 
 

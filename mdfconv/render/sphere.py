@@ -6,7 +6,9 @@ known and one light direction gives one half vector for the whole picture.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +20,9 @@ VIEW = np.array([0.0, 0.0, 1.0])
 LIGHT = np.array([-0.5, 0.5, np.sqrt(0.5)])  # 45° off the viewer, from above left
 _AREA_HALF_SIDE = 0.15  # of the distance to the square light
 _AREA_SAMPLES = 8  # a side
+# Pairs of Gauss's nodes a side for each unit of half the range of t, and the least depth of what is
+# mirrored.
+_NODES, _BEHIND = 2, 1e-3
 MARGIN = 1.04  # half the picture, in radii
 # Some twenty vectors for each normal, as many as this, stay in the cache.
 _NORMALS_AT_ONCE = 8192
@@ -38,18 +43,79 @@ class Lights:
     directions: Array
     irradiance: Array
 
+    def resolved(self, width: float) -> Lights:
+        """Return the light in samples between which a lobe of a half width, radians, is smooth."""
+        return self
+
+    def samples(self, normals: Array) -> Iterator[tuple[Any, Array, Array]]:
+        """Yield which normals a sample is for, unit vectors towards it, and its irradiance."""
+        for direction, irradiance in zip(self.directions, self.irradiance, strict=True):
+            yield slice(None), direction, irradiance
+
+
+# The sides of the level square around `LIGHT`, which faces the sphere.
+_RIGHT = unit(np.cross([0.0, 1.0, 0.0], LIGHT))
+_SIDES = np.stack([_RIGHT, np.cross(LIGHT, _RIGHT)])
+# What it brings, π, by its solid angle.
+_BRIGHTNESS = np.pi / (4 * np.arctan(_AREA_HALF_SIDE**2 / np.sqrt(1 + 2 * _AREA_HALF_SIDE**2)))
+
+
+def _on_square(places: Array) -> tuple[Array, Array]:
+    """Return unit vectors towards places of the square, and their solid angle by their area."""
+    toward = LIGHT + places @ _SIDES
+    distance = np.linalg.norm(toward, axis=-1)
+    # The cosine at the light over distance².
+    return toward / distance[..., None], distance**-3
+
+
+@dataclass(frozen=True)
+class _Square(Lights):
+    """The square, in samples that are the same for all normals."""
+
+    def resolved(self, width: float) -> Lights:
+        # Around the mirror direction a lobe is half as wide, and a half vector moves by half of
+        # what the light does: the widest lobe of which samples could be told apart.
+        if width < 4 * _AREA_HALF_SIDE / _AREA_SAMPLES:
+            return _GradedSquare(self.directions, self.irradiance, width)
+        return self
+
 
 def _square() -> Lights:
-    """Return a level square around `LIGHT`, which faces the sphere; total irradiance π."""
-    right = unit(np.cross([0.0, 1.0, 0.0], LIGHT))
-    up = np.cross(LIGHT, right)
+    """Return the square; total irradiance π."""
     steps = _AREA_HALF_SIDE * (2 * (np.arange(_AREA_SAMPLES) + 0.5) / _AREA_SAMPLES - 1)
-    x, y = (grid.ravel()[:, None] for grid in np.meshgrid(steps, steps))
-    toward = LIGHT + x * right + y * up
-    distance = np.linalg.norm(toward, axis=1)
-    # A sample of the square counts by its solid angle: cosine at the light over distance².
-    weight = distance**-3
-    return Lights(toward / distance[:, None], np.pi * weight / weight.sum())
+    directions, weight = _on_square(np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2))
+    return _Square(directions, np.pi * weight / weight.sum())
+
+
+@dataclass(frozen=True)
+class _GradedSquare(Lights):
+    """The square, in samples that crowd around what a mirror would show at each normal.
+
+    On each side u = u₀ + s sinh t with Gauss's nodes in t, u₀ the mirrored place or the nearest
+    one on the square, and s the width of the lobe or the distance between the two.
+    """
+
+    width: float
+
+    def samples(self, normals: Array) -> Iterator[tuple[Any, Array, Array]]:
+        """Yield samples as `Lights.samples`, more for normals that mirror the square."""
+        mirrored = 2 * (normals @ VIEW)[:, None] * normals - VIEW
+        # What is mirrored from behind is far from the square.
+        places = mirrored @ _SIDES.T / np.maximum(mirrored @ LIGHT, _BEHIND)[:, None]
+        nearest = np.clip(places, -_AREA_HALF_SIDE, _AREA_HALF_SIDE)
+        scale = np.maximum(self.width, np.linalg.norm(places - nearest, axis=1))[:, None]
+        low = np.arcsinh((-_AREA_HALF_SIDE - nearest) / scale)
+        reach = 0.5 * (np.arcsinh((_AREA_HALF_SIDE - nearest) / scale) - low)
+        counts = 2 * np.ceil(_NODES * reach.max(axis=1))
+        for count in np.unique(counts).astype(int):
+            which = np.flatnonzero(counts == count)
+            nodes, weights = np.polynomial.legendre.leggauss(count)
+            t = low[which] + reach[which] * (1 + nodes[:, None, None])
+            along = nearest[which] + scale[which] * np.sinh(t)
+            share = scale[which] * np.cosh(t) * reach[which] * weights[:, None, None]
+            for u, v in np.ndindex(count, count):
+                directions, solid = _on_square(np.stack([along[u, :, 0], along[v, :, 1]], axis=-1))
+                yield which, directions, _BRIGHTNESS * solid * share[u, :, 0] * share[v, :, 1]
 
 
 LIGHTS: Registry[Lights] = Registry("light")
@@ -82,34 +148,43 @@ def _radiance(normals: Array, brdf: Brdf, light: Lights) -> Array:
     total: Array = np.zeros(len(normals))
     local = frames(normals)
     view = local @ VIEW
-    for direction, irradiance in zip(light.directions, light.irradiance, strict=True):
-        toward = local @ direction
-        lit = np.flatnonzero((view[:, 2] > 0) & (toward[:, 2] > 0))
-        sent = brdf(toward[lit], view[lit]) * toward[lit, 2] * irradiance
-        everywhere = np.zeros((*sent.shape[:-1], len(normals)))
-        everywhere[..., lit] = sent
-        total = total + everywhere
+    everywhere = np.arange(len(normals))
+    for which, direction, irradiance in light.samples(normals):
+        toward = (local[which] @ direction[..., None])[..., 0]
+        lit = (view[which, 2] > 0) & (toward[:, 2] > 0)
+        brought = np.broadcast_to(irradiance, lit.shape)[lit]
+        seen = everywhere[which][lit]
+        sent = brdf(toward[lit], view[seen]) * toward[lit, 2] * brought
+        added = np.zeros((*sent.shape[:-1], len(normals)))
+        added[..., seen] = sent
+        total = total + added
     return total
 
 
 @dataclass(frozen=True)
 class Frame:
-    """The pixels of a square picture that show the sphere.
+    """The pixels of a square picture that show the sphere, or a part of it.
 
     Parameters
     ----------
     size : int
         Pixels a side.
+    centre : tuple of float
+        What is in the middle of the picture, x and y in radii.
+    half : float
+        Half the picture, in radii.
     """
 
     size: int
+    centre: tuple[float, float] = (0.0, 0.0)
+    half: float = MARGIN
 
     def normals(self) -> tuple[Array, Array]:
         """Return the pixels' normals, shape (size², 3), and how far each is covered, 0 to 1."""
-        axis = MARGIN * (2 * (np.arange(self.size) + 0.5) / self.size - 1)
-        x, y = np.meshgrid(axis, -axis)
+        axis = self.half * (2 * (np.arange(self.size) + 0.5) / self.size - 1)
+        x, y = np.meshgrid(self.centre[0] + axis, self.centre[1] - axis)
         radius = np.hypot(x, y)
-        pixel = 2 * MARGIN / self.size
+        pixel = 2 * self.half / self.size
         coverage = np.clip((1 - radius) / pixel + 0.5, 0, 1)
         # A pixel that straddles the silhouette shows what lies just inside it.
         shrink = np.minimum(1, (1 - 0.25 * pixel) / np.maximum(radius, 1e-300))
@@ -158,3 +233,10 @@ def highlight() -> tuple[float, float]:
     """Return where the highlight lies: the half vector's x and y, in radii."""
     x, y, _ = half_vector(LIGHT, VIEW)
     return float(x), float(y)
+
+
+def highlight_extent(lobe: float, light: Lights) -> float:
+    """Return how far the highlight reaches, radians, for the angle up to which a lobe does."""
+    halves = half_vector(light.directions, VIEW)
+    cosine = np.clip(halves @ half_vector(LIGHT, VIEW), -1, 1)
+    return lobe + float(np.arccos(cosine).max())

@@ -16,5 +16,5 @@ def interactive_page() -> Artefact:
         {"comparison.html": filled(data)},
         "GGX in place of Beckmann, to judge by eye: a page for a browser",
         f"the numbers of `convert` within {100 * data['interpolation']:.1g} %",
-        f"mdfconv compare --mdf {ROUGHNESS} --html comparison.html",
+        f"mdfconv compare --to {ROUGHNESS} --html comparison.html",
     )

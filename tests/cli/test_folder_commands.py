@@ -26,14 +26,14 @@ from tests.cli.runner import run
         (("compare", "--size", "0"), "16 to 4096"),
         (("compare", "--dpi", "-5"), "--dpi"),
         (("compare", "--exposure", "0"), "exposure"),
-        (("compare", "--m-b", "nan"), "not a finite number"),
+        (("compare", "nan"), "not a finite number"),
         (("compare", "--light", "sun"), "'sun' is not one of"),
-        (("compare", "--mdf", "gx"), "did you mean ggx"),
+        (("compare", "--to", "gx"), "did you mean ggx"),
         (("compare", "--method", "wart"), "did you mean ward"),
         (("compare", "--material", "golt"), "did you mean gold"),
         (("compare", "--brdf", "phong"), "'phong' is not one of"),
-        (("compare", "--m-b", "1e-8"), "falls between the pixels"),
-        (("compare", "--m-b", "0.001", "--size", "64"), "falls between the pixels"),
+        (("compare", "1e-8"), "falls between the pixels"),
+        (("compare", "0.001", "--size", "64"), "falls between the pixels"),
     ],
 )
 def test_bad_requests_write_nothing(tmp_path, arguments, words):

@@ -101,7 +101,7 @@ WRITING = [
     "fit a.csv --to ggx -o new.csv --png new.png --report new.md",
     "fit-table --m-b 0.2 -o new.csv",
     "plot-error -o new --svg --m-b 0.2",
-    "compare -o new --size 32 --m-b 0.3",
+    "compare -o new --size 32 0.3",
     "compare --html new.html",
     "light map.exr --csv new.csv --png new.png",
     "furnace 0.5 --png new.png -o new.txt",

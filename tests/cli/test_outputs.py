@@ -58,8 +58,8 @@ class Case:
         return (*self.folder, *(name for name in self.outputs.values() if "." in name))
 
 
-SMALLEST = "--size", "16", "--dpi", "10", "--m-b", "0.4"
-SMALL = *SMALLEST, "--mdf", "ggx", "--method", "peak"
+SMALLEST = "--size", "16", "--dpi", "10", "0.4"
+SMALL = *SMALLEST, "--to", "ggx", "--method", "peak"
 CASES = {
     "mtl": Case(
         ["mtl", "a.mtl", "--textures"], {"--output": "b.mtl"}, ("a.mtl", "x.png"), ("x_Pr.png",)
@@ -95,7 +95,7 @@ CASES = {
     "compare": Case(
         ["compare", *SMALL],
         {"--output": "out", "--html": "page.html"},
-        folder=("out/compare-m_b-0.4-ggx-peak.png", "out/compare-m_b-0.4-ggx-peak.csv"),
+        folder=("out/compare-beckmann-0.4-ggx-peak.png", "out/compare-beckmann-0.4-ggx-peak.csv"),
     ),
     "light": Case(
         ["light", "map.exr", "--m-b", "0.2"], {"--csv": "light.csv", "--png": "l.png"}, ("map.exr",)
@@ -418,7 +418,8 @@ def test_a_file_that_appears_meanwhile_is_kept(monkeypatch):
 @pytest.mark.parametrize(
     "options",
     [
-        [], ["--mdf", "gauss"], ["--method", "peak"], ["--method", "fit", "--metric", "energy"],
+        [], ["--to", "gauss"], ["--to", "ggx:roughness"], ["--method", "peak"],
+        ["--method", "fit", "--metric", "energy"],
         ["--metric", "display"], ["--exposure", "4"], ["--light", "area"], ["--unit"],
         ["--brdf", "smoothie"], ["--material", "gold"], ["--material", "acrylic"],
     ],
@@ -427,9 +428,9 @@ def test_pictures_have_the_names_of_what_they_show(options):
     """So that no two of these have one."""
     assert run("compare", *SMALLEST, *options, "--output", "out")[0] == 0
     names = {path.name for path in Path("out").iterdir()}
-    start = "compare-m_b-0.4"
-    words = [word.removeprefix("--") for word in options]
-    values = [word for word in words if word not in ("mdf", "method", "metric", "light", "brdf",
+    start = "compare-beckmann-0.4"
+    words = [word.removeprefix("--").replace(":", "-") for word in options]
+    values = [word for word in words if word not in ("to", "method", "metric", "light", "brdf",
                                                      "material")]  # fmt: skip
     expected = "-".join([start, *values]).replace("unit", "unit-form")
     expected = expected.replace("-display", "-fit-display")

@@ -10,10 +10,13 @@ from PIL import Image
 from mdfconv.brdf.fresnel import schlick_fresnel
 from mdfconv.brdf.microsurface import Microsurface
 from mdfconv.brdf.reflection import BRDFS
-from mdfconv.distributions import distribution
+from mdfconv.conversion.endpoint import encodings_of, endpoint
+from mdfconv.distributions import distribution, one_parameter_distributions
+from mdfconv.distributions.dialects import DIALECTS, Specular
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.paper.error_curves import DRAWN
 from mdfconv.render.comparison import PAPER_FIGURES, Rule, Scene, compare, default_rules
+from mdfconv.render.comparison_figure import _diverging, draw_comparison
 from mdfconv.render.sphere import (
     LIGHT,
     LIGHTS,
@@ -24,7 +27,7 @@ from mdfconv.render.sphere import (
     highlight,
     radiance,
 )
-from tests.cli.runner import run
+from tests.cli.runner import run, run_on_terminal
 
 NAMES = ["beckmann", "blinn-phong", "gauss", "ggx", "sawicki", "schlick", "smoothie", "gtr"]
 
@@ -92,13 +95,38 @@ def test_area_light():
     square = LIGHTS["area"]
     assert square.irradiance.sum() == pytest.approx(np.pi)
     np.testing.assert_allclose(np.linalg.norm(square.directions, axis=1), 1)
-    surface = Scene().surface("ggx", 0.05)
+    surface = Scene().surface(distribution("ggx"), 0.05)
     wide, narrow = (
         radiance(cross_section(401, 0.5)[1], surface, light)
         for light in (square, LIGHTS["directional"])
     )
     assert wide.max() < narrow.max()
     assert np.count_nonzero(wide > 0.5 * wide.max()) > np.count_nonzero(narrow > 0.5 * narrow.max())
+
+
+def many_points(a_side):
+    """The square light as the brute force has it: equal cells, each a point."""
+    toward = [
+        LIGHT
+        + 0.15 * (2 * (i + 0.5) / a_side - 1) * right
+        + 0.15 * (2 * (j + 0.5) / a_side - 1) * up
+        for right in [np.cross([0, 1, 0], LIGHT) / np.linalg.norm(np.cross([0, 1, 0], LIGHT))]
+        for up in [np.cross(LIGHT, right)]
+        for i in range(a_side)
+        for j in range(a_side)
+    ]
+    distance = np.linalg.norm(toward, axis=1)
+    return Lights(toward / distance[:, None], np.pi * distance**-3 / np.sum(distance**-3))
+
+
+@pytest.mark.parametrize("brdf", ["ashikhmin-shirley", "modified-phong"])
+@pytest.mark.parametrize(("name", "parameter"), [("beckmann", 0.02), ("ggx", 0.015)])
+def test_a_square_light_has_no_dots_on_a_smooth_surface(name, parameter, brdf):
+    surface = Scene(brdf).surface(distribution(name), parameter)
+    normals = cross_section(40, 0.15)[1]
+    expected = radiance(normals, surface, many_points(100))
+    found = radiance(normals, surface, LIGHTS["area"].resolved(0.02))
+    np.testing.assert_allclose(found, expected, atol=1e-2 * expected.max())
 
 
 def test_silhouette_is_antialiased():
@@ -144,9 +172,190 @@ def test_each_fit_wins_where_it_promises_to():
 
 
 def test_unit_form_keeps_the_peak():
-    found = compare(0.1, default_rules(1.0)[:1], Scene(size=64, normalized=False), ["ggx"])
+    found = compare(0.1, default_rules(1.0)[:1], Scene(size=64, normalized=False), targets=["ggx"])
     section = found.rows["closed-form (shape)"][0].section
     assert section.max() == pytest.approx(1, abs=2e-3)
+
+
+@pytest.mark.parametrize("light", ["directional", "area"])
+@pytest.mark.parametrize("m_b", [0.1, 0.04464, 0.02])
+def test_a_small_highlight_is_enlarged(m_b, light):
+    """The light in it is that of the picture, on as many times more pixels as it says."""
+    found = compare(m_b, default_rules(1.0)[1:2], Scene(size=96, light=light), targets=["gauss"])
+    times = found.magnification
+    # Up to four times m_B, by which Beckmann has fallen to e⁻¹⁶; the area light adds its size.
+    assert times == int(1.04 / np.sin(min(4 * m_b + (0.105 if light == "area" else 0), np.pi / 2)))
+    for rendering in (found.reference, found.rows["fit energy (light)"][0]):
+        light_in = rendering.closeup.sum() / max(times, 1) ** 2
+        assert light_in == pytest.approx(rendering.image.sum(), rel=0.02)
+    row, column = np.unravel_index(found.reference.closeup.argmax(), (96, 96))
+    assert abs(row - 47.5) < 20
+    assert abs(column - 47.5) < 20
+
+
+def test_a_large_highlight_is_not_enlarged():
+    found = compare(0.4, default_rules(1.0)[:1], Scene(size=48), targets=["ggx"])
+    assert found.magnification == 1
+    assert found.reference.closeup is found.reference.image or np.array_equal(
+        found.reference.closeup, found.reference.image
+    )
+
+
+@pytest.mark.parametrize("material", [None, "gold"])
+def test_differences_are_those_of_the_displayed_pictures(material):
+    scene = Scene(size=64, material=material)
+    targets = ["ggx", "blinn-phong:obj2gltf"]
+    found = compare(50, default_rules(1.0)[1:2], scene, "blinn-phong", targets)
+    other, same = found.rows["fit energy (light)"]
+    difference = found.difference(other)
+    assert difference.shape == (64, 64)
+    assert np.abs(found.difference(same)).max() < 1e-12
+    # A pixel at a time, by the definition of sRGB.
+    for row, column in [(20, 20), (28, 12), (24, 24), (60, 5)]:
+        pixels = [
+            np.clip(np.atleast_1d(one.closeup[..., row, column]), 0, 1)
+            for one in (other, found.reference)
+        ]
+        encoded = [
+            np.where(v <= 0.0031308, 12.92 * v, 1.055 * v ** (1 / 2.4) - 0.055) for v in pixels
+        ]
+        channels = encoded[0] - encoded[1]
+        expected = channels[np.argmax(np.abs(channels))]
+        assert difference[row, column] == pytest.approx(expected, abs=1e-6)
+
+
+def test_colors_of_differences():
+    darker, white, brighter = _diverging(np.array([-1.0, 0.0, 1.0])).astype(int)
+    assert white.tolist() == [255, 255, 255]
+    assert darker[2] > darker[0] + 100
+    assert brighter[0] > brighter[2] + 100
+
+
+def forms():
+    """Every distribution and every form in which its parameter is stored."""
+    needy = {dialect.name for dialect in DIALECTS if dialect.specular is Specular.needed}
+    for mdf in one_parameter_distributions():
+        yield mdf.name
+        names = encodings_of(mdf)
+        for name in names if names != ["alpha"] else []:
+            yield f"{mdf.name}:{name}" + ":0.5" * (name in needy)
+
+
+@pytest.mark.parametrize("name", list(forms()))
+def test_any_form_is_compared_with_any(name):
+    end = endpoint(name)
+    # A lobe of usual width, which every form can store.
+    value = float(end.encode(np.array(endpoint("beckmann").distribution.parameter.typical_value)))
+    if end.distribution.parameter.larger_is_smoother:
+        value = float(end.encode(np.array(50.0)))
+    rules = [Rule("fit", metric_named("energy"))]
+    scene = Scene(size=64)
+    from_it = compare(value, rules, scene, name, ["beckmann", "ggx:roughness"])
+    assert (from_it.reference.name, from_it.reference.value) == (end.label, value)
+    beckmann, ggx = from_it.rows["fit energy (light)"]
+    assert (beckmann.name, ggx.name) == ("beckmann", "ggx:roughness")
+    back = compare(beckmann.value, rules, scene, "beckmann", [name])
+    (there,) = back.rows["fit energy (light)"]
+    assert there.name == end.label
+    assert there.value == pytest.approx(value, rel=0.25)
+    image = draw_comparison(from_it, 60)
+    assert image.startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", ["closeup", "whole"])
+@pytest.mark.parametrize("targets", [1, 9])
+def test_no_text_is_cut_off_or_lies_on_another(targets, name, monkeypatch):
+    """Every text lies on the sheet, and apart from the others, whatever it says."""
+    import mdfconv.render.comparison_figure as figure_module
+
+    figures = []
+    monkeypatch.setattr(figure_module, "encoded", lambda figure, **_: figures.append(figure) or b"")
+    longest = "blinn-phong:" + max(
+        (d.name for d in DIALECTS if "blinn-phong" in d.owners and d.specular is Specular.no),
+        key=len,
+    )
+    rules = [Rule("fit", metric_named(kept)) for kept in ("energy", "display:2.25", "unit")]
+    ends = [longest, "ggx:roughness", "gauss", "schlick", "sawicki", "ggx", "beckmann", "gtr"]
+    scene = Scene(size=200, material="polycarbonate", brdf="smoothie-approx")
+    value = float(endpoint(longest).encode(np.array(90.0 if name == "whole" else 400.0)))
+    found = compare(value, rules, scene, longest, [*ends, "student-t"][:targets])
+    draw_comparison(found)
+    (figure,) = figures
+    figure.canvas.draw()
+    renderer = figure.canvas.get_renderer()
+    texts = [*figure.texts, *figure.legends[0].get_texts()]
+    texts += [t for axes in figure.axes for t in (axes.title, axes.xaxis.label, axes.yaxis.label)]
+    texts += [figure._suptitle]
+    boxes = {t: t.get_window_extent(renderer) for t in set(texts) if t.get_text()}
+    for text, box in boxes.items():
+        assert 0 <= box.x0 < box.x1 <= figure.bbox.x1, text
+        assert 0 <= box.y0 < box.y1 <= figure.bbox.y1, text
+        assert text.get_fontsize() >= 7, text
+        for other, second in boxes.items():
+            assert text is other or not box.overlaps(second), (text, other)
+
+
+def test_compare_from_another_distribution(tmp_path):
+    words = "compare", "--from", "blinn-phong", "--to", "ggx", "--to", "ggx:roughness", 100, 1000
+    words += "--size", 48, "--dpi", 60, "-o", tmp_path
+    status, out, err = run(*words)
+    assert status == 0
+    figures = {f"compare-blinn-phong-{n}-ggx-ggx-roughness" for n in (100, 1000)}
+    files = {f"{figure}.{kind}" for figure in figures for kind in ("png", "csv")}
+    assert {path.name for path in tmp_path.iterdir()} == files
+    assert {line.rsplit("/", 1)[1] for line in err.splitlines()} == files
+    rows = list(csv.DictReader(out.splitlines()))
+    assert len(rows) == 2 * 3 * 2
+    assert {row["figure"] for row in rows} == figures
+    alpha, roughness = (float(row["parameter"]) for row in rows[:2])
+    assert roughness**2 == pytest.approx(alpha)
+    section = (
+        (tmp_path / "compare-blinn-phong-100-ggx-ggx-roughness.csv").read_text().splitlines()[0]
+    )
+    assert section.startswith("position_radii,blinn-phong,")
+    status, text = run_on_terminal(*words, "--force", COLUMNS="200")
+    assert "Pictures against those of blinn-phong, N 100 and N 1000" in text
+    assert "α 0.166" in text
+    assert "r 0.4074" in text
+
+
+def test_compare_with_everything_says_what_is_left_out(tmp_path):
+    words = "compare", "--from", "ggx:roughness", "--to", "all", "--method", "closed-form", 0.97
+    status, out, err = run(*words, "--size", 32, "-o", tmp_path)
+    assert status == 0
+    names = {row["distribution"] for row in csv.DictReader(out.splitlines())}
+    left_out = [line for line in err.splitlines() if "left out" in line]
+    assert "ggx" not in names
+    assert len(names) + len(left_out) == len(one_parameter_distributions()) - 1
+    assert left_out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--from", "ggx:roughness"), "the roughness r of ggx:roughness is missing; give it"),
+        (("--from", "roughness", "0.2"), "did you mean ggx:roughness"),
+        (("--from", "ggx", "0.2", "--to", "shininess"), "did you mean blinn-phong"),
+        (("--from", "ashikhmin-shirley", "100"), "blinn-phong"),
+        (("--from", "ggx:roughness", "20%"), "Did you mean 0.2"),
+        (("--from", "ggx:roughness", "1.5"), "0 < r ≤ 1"),
+        (("--from", "blinn-phong", "--to", "blinn-phong:fbx", "400"), "no inverse"),
+        (("--from", "blinn-phong:fbx", "0"), "r = 0 is any N ≥ 100"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_compared(words, message, tmp_path):
+    status, out, err = run("compare", *words, "--size", 32, cwd=tmp_path)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+    assert not list(tmp_path.rglob("*.*"))
+
+
+def test_what_phong_is_taken_for(tmp_path):
+    words = "compare", "--from", "phong", "--to", "ggx", 100, "--size", 32, "-o", tmp_path
+    status, _, err = run(*words)
+    assert status == 0
+    assert "note: phong is taken for Blinn's exponent" in err
 
 
 def test_compare(tmp_path):
@@ -161,22 +370,22 @@ def test_compare(tmp_path):
     section = list(csv.DictReader((folder / "fig4.csv").read_text().splitlines()))
     assert list(section[0])[:2] == ["position_radii", "beckmann"]
     status, out, _ = run(
-        "compare", "--m-b", 0.2, "--mdf", "ggx", "--light", "area", "--brdf", "cook-torrance",
+        "compare", 0.2, "--to", "ggx", "--light", "area", "--brdf", "cook-torrance",
         "--unit", "--method", "fit", "--metric", "display", "--exposure", 4, "--size", 32,
         "--output", folder, "--format", "json",
     )  # fmt: skip
     assert status == 0
     (record,) = json.loads(out)
     assert record["conversion"] == "fit display (picture)"
-    name = "compare-m_b-0.2-ggx-fit-display-4-cook-torrance-area-unit-form-exposure-4.png"
+    name = "compare-beckmann-0.2-ggx-fit-display-4-cook-torrance-area-unit-form-exposure-4.png"
     assert (folder / name).exists()
 
 
 def test_a_distant_light_shows_a_metal_in_one_color():
     """One half vector for the whole picture: each channel is the grey picture, scaled by F."""
     rules = default_rules(1.0)[1:2]
-    grey = compare(0.3, rules, Scene(size=48), ["ggx"])
-    gold = compare(0.3, rules, Scene(size=48, material="gold"), ["ggx"])
+    grey = compare(0.3, rules, Scene(size=48), targets=["ggx"])
+    gold = compare(0.3, rules, Scene(size=48, material="gold"), targets=["ggx"])
     assert gold.reference.image.shape == (3, 48, 48)
     cosine = np.cos(np.pi / 8)  # the light is 45° off the viewer
     color = np.array([1.0, 0.766, 0.336])
@@ -199,21 +408,21 @@ def test_fresnel_shows_where_it_takes_the_viewers_angle():
     rims = {}
     for name in ("acrylic", "silver"):
         scene = Scene("modified-phong", size=64, material=name)
-        found = compare(0.4, default_rules(1.0)[:1], scene, ["ggx"])
+        found = compare(0.4, default_rules(1.0)[:1], scene, targets=["ggx"])
         rims[name] = np.interp(0.85, found.position, found.reference.section)
     assert rims["acrylic"] > 1.2 * rims["silver"] > 0
 
 
 def test_compare_a_material(tmp_path):
     status, out, _ = run(
-        "compare", "--m-b", 0.2, "--mdf", "smoothie", "--material", "Copper", "--brdf",
+        "compare", 0.2, "--to", "smoothie", "--material", "Copper", "--brdf",
         "smoothie-approx", "--method", "half-angle", "--size", 64, "--output", tmp_path,
         "--format", "json",
     )  # fmt: skip
     assert status == 0
     (record,) = json.loads(out)
     assert record["distribution"] == "smoothie"
-    (sheet,) = tmp_path.glob("compare-m_b-0.2-smoothie-*.png")
+    (sheet,) = tmp_path.glob("compare-beckmann-0.2-smoothie-*.png")
     with Image.open(sheet) as picture:
         pixels = np.asarray(picture.convert("RGB")).astype(int)
     # Copper is red; the sheet around it, and a grey material, are not.
@@ -224,9 +433,9 @@ def test_compare_a_material(tmp_path):
 
 def test_a_sheet_shows_the_pixels_asked_for(tmp_path):
     status, _, _ = run(
-        "compare", "--m-b", 0.2, "--mdf", "ggx", "--size", 400, "--dpi", 100, "--output", tmp_path
+        "compare", 0.2, "--to", "ggx", "--size", 400, "--dpi", 100, "--output", tmp_path
     )
     assert status == 0
-    with Image.open(tmp_path / "compare-m_b-0.2-ggx.png") as picture:
+    with Image.open(tmp_path / "compare-beckmann-0.2-ggx.png") as picture:
         assert picture.size[0] > 800
         assert picture.size[1] > 1200

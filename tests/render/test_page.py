@@ -243,7 +243,7 @@ def test_halves_are_the_pictures_of_compare(number, light, m_b, tmp_path):
     ours, _ = opened(tmp_path, page, show(number, m_b))
     ours = np.reshape(ours, (SIZE, SIZE))
     rule = Rule("fit", metric_named("environment"))
-    pictures = compare(m_b, [rule], Scene(light=light, size=SIZE), ["ggx"])
+    pictures = compare(m_b, [rule], Scene(light=light, size=SIZE), targets=["ggx"])
     background = (1 - Frame(SIZE).normals()[1].reshape(SIZE, SIZE)) * BACKGROUND
     source, target = (
         _bytes(rendering.image + background)[..., 0].astype(int)
@@ -313,7 +313,7 @@ return [controls.filter((one) => !named(one)).length, controls.length,
 
 def test_command_writes_the_page_alone(tmp_path):
     status, _, err = run(
-        "compare", "--from", "blinn-phong", "--mdf", "ggx:roughness", "--html", "page.html",
+        "compare", "--from", "blinn-phong", "--to", "ggx:roughness", "--html", "page.html",
         cwd=tmp_path,
     )  # fmt: skip
     assert (status, err) == (0, "mdfconv: wrote page.html\n")
@@ -324,11 +324,9 @@ def test_command_writes_the_page_alone(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--from", "ggx"), "--from goes with --html"),
-        (("--from", "ggx:roughness", "--html", "page.html"), "in no stored form"),
-        (("--m-b", "3", "--html", "page.html"), "from 0.01 to 0.8"),
-        (("--from", "ggx", "--m-b", "0.1", "--html", "page.html"), "--m-b is the parameter"),
-        (("--mdf", "gx", "--html", "page.html"), "did you mean ggx"),
+        (("3", "--html", "page.html"), "from 0.01 to 0.8"),
+        (("--from", "ggx:roughness", "2", "--html", "page.html"), "0 < r ≤ 1"),
+        (("--to", "gx", "--html", "page.html"), "did you mean ggx"),
         (("--html", "no/folder/page.html"), "not an existing directory"),
     ],
 )

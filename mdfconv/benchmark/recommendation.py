@@ -124,8 +124,9 @@ def recommend(
     Raises
     ------
     MdfconvError
-        If the tolerance is not a positive number.
+        If the tolerance is not a positive number, or float32 does not hold the surface.
     """
+    source.parameter.check(parameter, source.name, np.dtype(np.float32))
     if not 0 < tolerance < np.inf:
         raise MdfconvError(f"a tolerance is a number above 0, not {tolerance:g}")
     surface = np.array([parameter])

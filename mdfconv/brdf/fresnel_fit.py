@@ -43,7 +43,8 @@ class Weight:
 
     def __call__(self, cosine: Array) -> Array:
         """Return the density, relative to its maximum, at cosines l·H."""
-        return np.exp(-0.5 * np.square((2 * np.square(cosine) - self.mu) / self.sigma))
+        with np.errstate(over="ignore"):
+            return np.exp(-0.5 * np.square((2 * np.square(cosine) - self.mu) / self.sigma))
 
 
 @dataclass(frozen=True)

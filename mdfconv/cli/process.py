@@ -136,6 +136,7 @@ def _collect_warnings() -> list[str]:
             usual(message, category, *place, **more)
 
     warnings.showwarning = show
+    warnings.simplefilter("always", MdfconvWarning)
     return notes
 
 

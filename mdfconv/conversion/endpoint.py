@@ -60,7 +60,8 @@ class Endpoint:
         """Return the parameters (float64) for stored values; raise if one is illegal."""
         self._check_clamps(values)
         stored = np.asarray(self.stored.check(values, self.label), dtype=np.float64)
-        parameter = self.encoding.decode(stored) if self.encoding else stored
+        with np.errstate(all="ignore"):
+            parameter = self.encoding.decode(stored) if self.encoding else stored
         checked: Array = np.asarray(
             self.distribution.parameter.check(parameter, self.distribution.name)
         )
@@ -74,14 +75,15 @@ class Endpoint:
         stored = values if legal.all() else np.where(legal, values, np.nan)
         if not self.encoding:
             return stored
-        parameter = self.encoding.decode(stored)
+        with np.errstate(all="ignore"):
+            parameter = self.encoding.decode(stored)
         return np.where(self.distribution.parameter.accepts(parameter), parameter, np.nan)
 
     def encode(self, parameter: Array) -> Array:
         """Return the stored values for parameters; NaN where they cannot be stored."""
         if not self.encoding:
             return parameter
-        with np.errstate(invalid="ignore"):
+        with np.errstate(all="ignore"):
             stored = self.encoding.encode(parameter)
         accepted = self.stored.accepts(stored) | self.encoding.clamped(stored)
         return np.where(accepted, stored, np.nan)

@@ -436,8 +436,8 @@ class Distribution(ABC):
 
         bracket = (np.log(_SMALLEST_DRAWN), np.log(np.pi / 2))
         beta = np.exp(find_root(excess, bracket, lobe, tail, parameter))
-        # A tail too thin for any float below π/2 lies there.
-        return np.where(np.isnan(beta) & (tail < lobe), 0.5 * np.pi, beta)
+        # A tail too thin for any float below π/2 lies there, a lobe too thin at 0.
+        return np.where(np.isnan(beta), np.where(tail < lobe, 0.5 * np.pi, 0.0), beta)
 
     def _half_tangent(self, parameter: Array) -> Array:
         def excess(log_beta: Array, parameter: Array) -> Array:

@@ -115,9 +115,10 @@ class Dialect:
         def encode(value: Array) -> Array:
             return self.encode(value, weight)
 
-        clamps = tuple(
-            replace(clamp, limit=float(decode(np.array(clamp.edge)))) for clamp in self.clamps
-        )
+        with np.errstate(all="ignore"):
+            clamps = tuple(
+                replace(clamp, limit=float(decode(np.array(clamp.edge)))) for clamp in self.clamps
+            )
         low, high = parameter.typical
         for clamp in clamps:
             if clamp.above:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+import numpy as np
+
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
 
@@ -73,7 +75,8 @@ def exact_route(source: Distribution, target: Distribution) -> Sequence[Formula]
 
 
 def follow(steps: Sequence[Formula], parameter: Array) -> Array:
-    """Return what the steps make of parameters, one after the other."""
-    for step in steps:
-        parameter = step.function(parameter)
+    """Return what the steps make of parameters, one after the other; infinite at an end of both."""
+    with np.errstate(all="ignore"):
+        for step in steps:
+            parameter = step.function(parameter)
     return parameter

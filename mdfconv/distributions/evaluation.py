@@ -116,14 +116,16 @@ def evaluate(kernel: Kernel, beta: ArrayLike, *operands: ArrayLike, threads: int
     except ValueError:
         shapes = ", ".join(str(array.shape) for array in arrays)
         raise MdfconvError(f"shapes {shapes} do not broadcast against each other") from None
-    iterator = np.nditer(  # type: ignore[call-overload]
-        [*arrays, None],
-        flags=["external_loop", "buffered", "zerosize_ok", "ranged"],
-        op_flags=[["readonly"]] * len(arrays) + [["writeonly", "allocate"]],
-        op_dtypes=[dtype] * (len(arrays) + 1),
-        casting="same_kind",
-        buffersize=min(_LARGEST_BLOCK, max(_SMALLEST_BLOCK, size // _BLOCKS_AT_LEAST)),
-    )
+    # An angle that is infinite in a short type is beyond the horizon.
+    with np.errstate(over="ignore"):
+        iterator = np.nditer(  # type: ignore[call-overload]
+            [*arrays, None],
+            flags=["external_loop", "buffered", "zerosize_ok", "ranged"],
+            op_flags=[["readonly"]] * len(arrays) + [["writeonly", "allocate"]],
+            op_dtypes=[dtype] * (len(arrays) + 1),
+            casting="same_kind",
+            buffersize=min(_LARGEST_BLOCK, max(_SMALLEST_BLOCK, size // _BLOCKS_AT_LEAST)),
+        )
     with iterator:
         in_parts(partial(_run, kernel, iterator), size, threads)
         result: Any = iterator.operands[-1]

@@ -76,11 +76,14 @@ def fit_free_gamma(
     if shape is None:
         raise MdfconvError(f"{target.name} has one parameter and no γ")
     rows = np.arange(parameter.size)
-    parts = [
-        _fit_batch(source, parameter, target, metric, quadrature, rows[at : at + _BATCH])
-        for at in range(0, parameter.size, _BATCH)
-    ]
+    # Where nothing fits the result is NaN, which says so.
+    with np.errstate(all="ignore"):
+        parts = [
+            _fit_batch(source, parameter, target, metric, quadrature, rows[at : at + _BATCH])
+            for at in range(0, parameter.size, _BATCH)
+        ]
     best, gamma, distance = np.concatenate(parts or [np.empty((3, 0))], axis=1)
+    best[~np.isfinite(distance)] = np.nan
     return FreeFit(best, gamma, distance, np.isin(gamma, shape.fit_range))
 
 
@@ -102,7 +105,7 @@ def _start(
         with np.errstate(all="ignore"):
             scanned = candidates(problem)[:, ::_EVERY]
             distance = problem.coarse_distance(scanned)
-        column = np.nanargmin(distance, axis=1)
+        column = np.argmin(np.where(np.isnan(distance), np.inf, distance), axis=1)
         best = np.stack([np.log(scanned[every, column]), np.full(rows.size, log_gamma)], axis=1)
         lower = distance[every, column] < lowest
         lowest[lower], start[lower] = distance[every, column][lower], best[lower]

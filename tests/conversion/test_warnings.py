@@ -65,3 +65,28 @@ def test_a_result_that_float16_rounds_to_none_is_refused(source, target):
     assert mdfconv.convert(least.astype(float), source, target, "peak").shape == (2,)
     with pytest.raises(mdfconv.MdfconvError, match="is none in float16; convert in float64"):
         mdfconv.convert(least, source, target, "peak")
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        lambda: mdfconv.explain(1e-320, "smoothie", "student-t", "fit", gamma="free"),
+        lambda: mdfconv.explain(1e100, "beckmann", "student-t", "fit", gamma="free"),
+        lambda: mdfconv.explain(0.001, "phong:assimp-gltf:1e-320", "ggx"),
+        lambda: mdfconv.convert(5e-324, "blinn-phong:peak", "ggx", "closed-form"),
+        lambda: mdfconv.convert(1e300, "smoothie", "blinn-phong:ifcopenshell-gltf", "fast"),
+        lambda: mdfconv.convert((1e200, 0.1), "beckmann", "beckmann:pbrt-v4", metric="energy"),
+    ],
+)
+def test_ends_of_floats_are_refused_without_a_warning_of_numpy(case):
+    with pytest.raises(mdfconv.MdfconvError):
+        case()
+
+
+def test_the_thinnest_shares_are_drawn():
+    shares = mdfconv.distribution("gauss").sample(5e-324, np.array([0.01, 0.4]))
+    assert shares.tolist() == [0, 0]
+
+
+def test_angles_beyond_a_short_type_are_beyond_the_horizon():
+    assert mdfconv.distribution("ggx").unit(1e308, np.array([0.4], np.float32)).tolist() == [0]

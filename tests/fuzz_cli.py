@@ -1,17 +1,17 @@
 """Random command lines, from the grammar that each command declares, run in this process."""
 
-import io
 import os
 import shlex
-import sys
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import typer
 from PIL import Image
 
-from mdfconv.cli import app, main
+from mdfconv.cli import app
 from tests import fuzz_api as api
+from tests.cli.runner import run_here
 
 GROUP = typer.main.get_command(app)
 # Seconds to minutes each, and hardly an option that does not end them at once.
@@ -73,7 +73,8 @@ class _Cli:
     def run(self, case):
         """Run a command line; return the class of its outcome, raise for what is none."""
         line, stdin = case
-        status, _, err = run(line, stdin)
+        with mock.patch.dict(os.environ, MDFCONV_DEBUG="1"):
+            status, _, err = run_here(*line, stdin=stdin)
         assert status in (0, 1, 2), f"status {status}: {' '.join(err.splitlines()[-3:])}"
         if status == 2:
             # What was written and noted before stays said.
@@ -82,24 +83,6 @@ class _Cli:
             assert lines[0].startswith("mdfconv: "), f"no line of mdfconv: {err}"
         assert "Traceback" not in err, f"a traceback: {err}"
         return f"exit {status}"
-
-
-def run(line, stdin):
-    """Run a command line in this process; return its status and what it wrote."""
-    before = sys.argv, sys.stdin, sys.stdout, sys.stderr
-    out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
-    sys.argv = ["mdfconv", *line]
-    sys.stdin = io.TextIOWrapper(io.BytesIO(stdin.encode()), "utf-8")
-    sys.stdout, sys.stderr = out, err
-    os.environ["MDFCONV_DEBUG"] = "1"
-    try:
-        main()
-    except SystemExit as end:
-        status = end.code
-    finally:
-        sys.argv, sys.stdin, sys.stdout, sys.stderr = before
-        del os.environ["MDFCONV_DEBUG"]
-    return status, *(stream.buffer.getvalue().decode() for stream in (out, err))
 
 
 def _words(parameter, choose):

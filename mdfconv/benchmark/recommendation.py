@@ -105,8 +105,8 @@ def recommend(
     The cost of a distribution is in a shader the count of its operations, then its error. In
     NumPy it is its time measured now, in float32: of those as quick as the quickest but for
     noise, the one with the fewest operations, then the one with the smallest error. The cost of
-    a conversion is the time that it takes for one value: of the methods
-    within a tenfold of the quickest, the one with the smallest error.
+    a conversion is the time that it takes for one value: of the methods within a tenfold of the
+    quickest, the one with the smallest error.
 
     Parameters
     ----------

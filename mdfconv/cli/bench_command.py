@@ -114,11 +114,10 @@ def _task(
 ) -> Task:
     from mdfconv.benchmark.measure import Task
     from mdfconv.benchmark.timing import FULL, QUICK
-    from mdfconv.conversion.endpoint import endpoint
+    from mdfconv.conversion.endpoint import one_parameter_endpoint
     from mdfconv.distributions import one_parameter_distribution, one_parameter_distributions
 
-    end = endpoint(reference)
-    one_parameter_distribution(end.distribution.name)
+    end = one_parameter_endpoint(reference)
     return Task(
         reference=end.distribution,
         parameters=_lobes(end, parameter),

@@ -18,9 +18,11 @@ from mdfconv.cli.options import (
     ForceOption,
     Format,
     FormatOption,
+    FromOption,
     MethodOption,
     asked_endpoint,
     chosen_metric,
+    refuse_idle_metric,
 )
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
 from mdfconv.cli.tables import form_of, tell, write_table
@@ -63,6 +65,7 @@ class Brdf(StrEnum):
 
 
 def command(
+    context: typer.Context,
     values: Annotated[
         list[float] | None,
         typer.Argument(
@@ -71,16 +74,7 @@ def command(
             show_default=False,
         ),
     ] = None,
-    source: Annotated[
-        str,
-        typer.Option(
-            "--from",
-            metavar="MDF",
-            autocompletion=completion.endpoints,
-            help="Distribution, or stored form such as ggx:roughness, that the pictures are "
-            "compared with.",
-        ),
-    ] = _REFERENCE,
+    source: FromOption = _REFERENCE,
     targets: Annotated[
         list[str] | None,
         typer.Option(
@@ -180,13 +174,14 @@ def command(
         if output is None:
             outputs.write(contents)
             return
+    refuse_idle_metric(context, method)
     rules = _rules(method, metric, exposure)
     surfaces = _surfaces(end, values)
     if _takes_every(targets):
         ends = _answering(surfaces.values(), rules, end, ends)
     scene = Scene(brdf.value, light.value, normalized, exposure, size, material)
     words = _words(scene, rules, targets or [])
-    figures = {"-".join([start, *words]): value for start, value in surfaces.items()}
+    figures = {_file_name([start, *words]): value for start, value in surfaces.items()}
     folder = check_folder(output)
     outputs.check(*(folder / f"{name}.{kind}" for name in figures for kind in ("csv", "png")))
     rows: list[dict[str, Any]] = []
@@ -222,8 +217,12 @@ def _words(scene: Scene, rules: Sequence[Rule], targets: Sequence[str]) -> list[
         )
         if differs
     ]
-    # A metric can name a file, which may stand in a folder, and a form has a colon.
-    return [re.sub(r"[^\w.+-]+", "-", word) for word in words]
+    return words
+
+
+def _file_name(words: Sequence[str]) -> str:
+    """Return words as a name: a metric can have that of a file in a folder, a form has a colon."""
+    return re.sub(r"[^\w.+-]+", "-", "-".join(words))
 
 
 def _takes_every(targets: list[str] | None) -> bool:
@@ -266,12 +265,11 @@ def _answering(
 
 
 def _surfaces(source: Endpoint, values: list[float] | None) -> Mapping[str, float]:
-    """Return the surfaces by the names of their files: the paper's, if none is asked for."""
+    """Return the surfaces by what their files' names begin with: the paper's if none is given."""
     from mdfconv.render.comparison import PAPER_FIGURES
 
     if values:
-        stem = f"compare-{source.label.replace(':', '-')}"
-        return {f"{stem}-{value_name(value)}": value for value in values}
+        return {f"compare-{source.label}-{value_name(value)}": value for value in values}
     if source.label != _REFERENCE:
         raise MdfconvError(
             f"the {source.stored.name} {source.stored.symbol} of {source.label} is missing",
@@ -304,8 +302,6 @@ def _rules(method: str | None, metric: str | None, exposure: float) -> list[Rule
 
     if method is None and metric is None:
         return default_rules(exposure)
-    if metric is not None and method is not None and not method_named(method).follows_metric:
-        raise MdfconvError(f"--metric goes with a fit, not with --method {method}")
     kept = metric_named(metric or "unit")
     # A screen's picture is exposed as the scene is.
     kept = chosen_metric(kept.name, exposure) if kept.setting == "exposure" else kept

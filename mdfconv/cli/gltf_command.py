@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mdfconv.cli.material_files import (
-    MATERIALS_SHOWN,
     InPlaceOption,
     ReportFormat,
     ReportFormatOption,
     ResultOption,
     about,
     convert_files,
-    importer_rows,
+    material_rows,
     print_importers,
     print_materials,
 )
@@ -33,7 +31,7 @@ from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
     from mdfconv.fitting.metrics import Metric
-    from mdfconv.scene.gltf import GltfConversion, GltfMaterial
+    from mdfconv.scene.gltf import GltfConversion
     from mdfconv.scene.material_files import Destination
 
 _HEADINGS = {
@@ -225,6 +223,7 @@ def _report(
     compare: bool,
 ) -> None:
     every = form is ReportFormat.json
+    known = [[material.parameter for material in each.materials] for _, each in converted]
     records: list[dict[str, Any]] = [
         {
             "file": str(destination.source),
@@ -233,28 +232,18 @@ def _report(
             "to": names[1],
             "metric": str(metric),
             "count": len(conversion.materials),
-            "materials": _rows(conversion.materials, metric, every=every, compare=compare),
+            "materials": material_rows(
+                conversion.materials, exponents, metric, every=every, compare=compare
+            ),
             "textures": [str(path) for path in conversion.files],
             "problems": [{"place": place, "problem": text} for place, text in conversion.problems],
         }
-        for destination, conversion in converted
+        for (destination, conversion), exponents in zip(converted, known, strict=True)
     ]
     if every:
         typer.echo(json_text(records))
         return
-    for record, (_, conversion) in zip(records, converted, strict=True):
+    for record, exponents in zip(records, known, strict=True):
         print_materials(record, _HEADINGS, record["count"])
         if compare:
-            print_importers(record, [material.parameter for material in conversion.materials])
-
-
-def _rows(
-    materials: Sequence[GltfMaterial], metric: Metric, *, every: bool, compare: bool
-) -> list[dict[str, Any]]:
-    shown = materials if every else materials[:MATERIALS_SHOWN]
-    rows: list[dict[str, Any]] = [
-        vars(material) | {"notes": list(material.notes)} for material in shown
-    ]
-    if compare:
-        importer_rows(rows, [material.parameter for material in shown], metric, every=every)
-    return rows
+            print_importers(record, exponents)

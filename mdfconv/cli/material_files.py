@@ -168,7 +168,37 @@ def print_materials(
         typer.echo(f"{record['file']}: nothing to convert", err=True)
 
 
-def importer_rows(
+def material_rows(
+    materials: Sequence[Any],
+    exponents: Sequence[float],
+    metric: Metric,
+    *,
+    every: bool,
+    compare: bool,
+) -> list[dict[str, Any]]:
+    """Return rows for materials, every one or those that a table shows.
+
+    Parameters
+    ----------
+    materials : sequence
+        What was converted: with `notes`, and more for the rows.
+    exponents : sequence of float
+        Those of the materials; NaN where there is none.
+    metric : Metric
+        Under which importers are compared.
+    every : bool
+        Whether all are wanted.
+    compare : bool
+        Whether the rows say what importers make of the exponents.
+    """
+    most = None if every else MATERIALS_SHOWN
+    rows = [vars(material) | {"notes": list(material.notes)} for material in materials[:most]]
+    if compare:
+        _add_importers(rows, exponents[:most], metric, every=every)
+    return rows
+
+
+def _add_importers(
     rows: list[dict[str, Any]], exponents: Sequence[float], metric: Metric, *, every: bool
 ) -> None:
     """Add to rows of materials what importers make of their exponents, to all or those shown."""

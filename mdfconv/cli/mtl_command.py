@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mdfconv.cli.material_files import (
-    MATERIALS_SHOWN,
     InPlaceOption,
     ReportFormat,
     ReportFormatOption,
     ResultOption,
     convert_files,
-    importer_rows,
+    material_rows,
     print_importers,
     print_materials,
 )
@@ -33,7 +31,7 @@ from mdfconv.output.records import json_text
 if TYPE_CHECKING:
     from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.material_files import Destination
-    from mdfconv.scene.mtl import Material, MtlConversion
+    from mdfconv.scene.mtl import MtlConversion
     from mdfconv.scene.mtl_textures import MtlTextures
 
 _HEADINGS = {
@@ -147,36 +145,27 @@ def _report(
     compare: bool,
 ) -> None:
     every = form is ReportFormat.json
+    known = [[material.shininess for material in each.materials] for _, each in converted]
     records: list[dict[str, Any]] = [
         {
             "file": str(destination.source),
             "output": str(destination.output),
             "metric": str(metric),
-            "materials": _rows(conversion.materials, metric, every=every, compare=compare),
+            "materials": material_rows(
+                conversion.materials, exponents, metric, every=every, compare=compare
+            ),
             "textures": [vars(texture) for texture in conversion.textures],
             "problems": [{"line": line, "problem": text} for line, text in conversion.problems],
             "notes": [{"line": line, "note": text} for line, text in conversion.notes],
         }
-        for destination, conversion in converted
+        for (destination, conversion), exponents in zip(converted, known, strict=True)
     ]
     if every:
         typer.echo(json_text(records))
         return
-    for record, (_, conversion) in zip(records, converted, strict=True):
-        print_materials(record, _HEADINGS, len(conversion.materials))
+    for record, exponents in zip(records, known, strict=True):
+        print_materials(record, _HEADINGS, len(exponents))
         for texture in record["textures"]:
             typer.echo(f"{texture['keyword']} {texture['file']} (line {texture['line']})", err=True)
         if compare:
-            print_importers(record, [material.shininess for material in conversion.materials])
-
-
-def _rows(
-    materials: Sequence[Material], metric: Metric, *, every: bool, compare: bool
-) -> list[dict[str, Any]]:
-    shown = materials if every else materials[:MATERIALS_SHOWN]
-    rows: list[dict[str, Any]] = [
-        vars(material) | {"notes": list(material.notes)} for material in shown
-    ]
-    if compare:
-        importer_rows(rows, [material.shininess for material in shown], metric, every=every)
-    return rows
+            print_importers(record, exponents)

@@ -170,6 +170,15 @@ def refuse_given(context: typer.Context, names: Collection[str], why: str) -> No
             raise MdfconvError(f"{option.opts[0]} {why}")
 
 
+def refuse_idle_metric(context: typer.Context, method: str | None) -> None:
+    """Refuse ``--metric`` beside a method that follows none; raise as `refuse_given`."""
+    if method is not None:
+        from mdfconv.conversion import method_named
+
+        if not method_named(method).follows_metric:
+            refuse_given(context, ["metric"], f"goes with a fit, not with --method {method}")
+
+
 def asked_endpoint(name: str) -> Endpoint:
     """Return the distribution of one parameter and its form that an option names.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -75,21 +74,26 @@ def command(
 
     mdfconv plot-error --m-b 0.2 --reference ggx --mdf beckmann --no-csv --output /tmp
     """
+    from mdfconv.conversion.arrays import given_metric
+    from mdfconv.paper.error_curves import curves
+
     if not png and not svg:
         refuse_given(context, ["dpi", "log"], "is of pictures: give no --no-png, or --svg")
     asked = asked_metric(metric, exposure)
-    sets = _sets(m_b, method, asked, reference, mdf)
+    chief = one_parameter_distribution(reference).name
+    sets = _sets(m_b, method, asked, chief, mdf)
     endings = [*[".png"] * png, *[".svg"] * svg, *["b.csv"] * csv]
     folder = check_folder(output)
     outputs = Outputs(*(folder / f"{name}{end}" for name in sets for end in endings), force=force)
-    figures = _curves(sets, reference, asked, points)
+    shown = given_metric(asked)
+    figures = {name: curves(each, chief, shown, points) for name, each in sets.items()}
     contents = {
         folder / f"{name}{end}": _file(name, drawn, end, dpi=dpi, log=log)
         for name, drawn in figures.items()
         for end in endings
     }
     rows = [{"figure": name} | row for name, drawn in figures.items() for row in drawn.maxima()]
-    title = f"Largest error against {one_parameter_distribution(reference).name}"
+    title = f"Largest error against {chief}"
     write_table(_COLUMNS, rows, format_, outputs, beside=contents, title=title)
 
 
@@ -97,13 +101,12 @@ def _sets(
     m_b: list[float] | None,
     method: str | None,
     metric: Metric | None,
-    reference: str,
+    chief: str,
     mdf: list[str] | None,
 ) -> dict[str, dict[str, float]]:
     """Return the parameters of each figure by its name."""
     from mdfconv.paper.error_curves import DRAWN, PAPER_SETS, parameters_for
 
-    chief = one_parameter_distribution(reference).name
     names = list(dict.fromkeys(one_parameter_distribution(name).name for name in mdf or ()))
     if m_b:
         names = names or [name for name in (_REFERENCE, *DRAWN) if name != chief]
@@ -126,16 +129,6 @@ def _sets(
     if any(set(parameters) == {chief} for parameters in sets.values()):
         raise MdfconvError(f"{chief} is the reference: name another --mdf to compare with it")
     return sets
-
-
-def _curves(
-    sets: Mapping[str, dict[str, float]], reference: str, metric: Metric | None, points: int
-) -> dict[str, Curves]:
-    from mdfconv.conversion.arrays import given_metric
-    from mdfconv.paper.error_curves import curves
-
-    chief, shown = one_parameter_distribution(reference).name, given_metric(metric)
-    return {name: curves(parameters, chief, shown, points) for name, parameters in sets.items()}
 
 
 def _file(name: str, drawn: Curves, end: str, *, dpi: int, log: bool) -> bytes:

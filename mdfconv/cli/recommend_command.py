@@ -71,11 +71,10 @@ def command(
     mdfconv recommend --from ggx:roughness 0.5 --tolerance 0.1 --metric display --format json
     """
     from mdfconv.benchmark.recommendation import recommend
-    from mdfconv.conversion.endpoint import endpoint, with_gamma
-    from mdfconv.distributions import one_parameter_distribution, one_parameter_distributions
+    from mdfconv.conversion.endpoint import one_parameter_endpoint, with_gamma
+    from mdfconv.distributions import one_parameter_distributions
 
-    end = with_gamma(endpoint(source), fixed_gamma(gamma))
-    one_parameter_distribution(end.distribution.name)
+    end = with_gamma(one_parameter_endpoint(source), fixed_gamma(gamma))
     kept = chosen_metric(metric, exposure)
     recommendation = recommend(
         end.distribution, float(end.decode(value)), one_parameter_distributions(), kept, tolerance

@@ -7,8 +7,10 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TextIO
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 import typer
 
@@ -154,19 +156,20 @@ def print_table(
         tell(f"… and {more} more; {everything} has them all")
 
 
-class _Column(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Column:
     """A column in print: its heading, its cells, and whether they are words, not numbers."""
 
     name: str
     cells: list[str]
     words: bool
 
-    @property
+    @cached_property
     def widest(self) -> int:
         """The width in which nothing wraps."""
         return max(_width(text) for text in (self.name, *self.cells))
 
-    @property
+    @cached_property
     def narrowest(self) -> int:
         """The least width: numbers stay whole, and words unless they are very long."""
         pieces = {word for text in self.cells for word in text.split()}

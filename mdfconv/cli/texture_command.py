@@ -20,6 +20,7 @@ from mdfconv.cli.options import (
     chosen_metric,
     fixed_gamma,
     refuse_given,
+    refuse_idle_metric,
 )
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import progress, tell
@@ -114,7 +115,8 @@ def command(
     from mdfconv.scene.texture import convert_texture_file
     from mdfconv.scene.texture_rule import TextureRule
 
-    _check_given(context, (source, target), method)
+    _check_given(context, source, target)
+    refuse_idle_metric(context, method)
     outputs = Outputs(output, png, force=force, inputs=[source_file])
     rule = TextureRule(
         *with_specular(source, target, specular),
@@ -149,14 +151,9 @@ def command(
         tell(f"wrote {png}")
 
 
-def _check_given(context: typer.Context, names: tuple[str, str], method: str | None) -> None:
-    """Refuse what says nothing about these names and this method."""
+def _check_given(context: typer.Context, *names: str) -> None:
+    """Refuse what says nothing about these names."""
     encodings = [name.partition(":")[2].strip().lower() for name in names]
     for option, encoding in (("exponent_max", "exponent"), ("log2_scale", "log2")):
         if encoding not in encodings:
             refuse_given(context, [option], f"goes with blinn-phong:{encoding}")
-    if method is not None:
-        from mdfconv.conversion import method_named
-
-        if not method_named(method).follows_metric:
-            refuse_given(context, ["metric"], f"goes with a fit, not with --method {method}")

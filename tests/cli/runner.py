@@ -5,6 +5,7 @@ that imports or the start may read, such as ``HOME`` or ``PYTHONHASHSEED``, is a
 """
 
 import atexit
+import io
 import json
 import os
 import pty
@@ -16,6 +17,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+
+from mdfconv.cli import main
 
 COMMAND = [sys.executable, "-m", "mdfconv"]
 TIMEOUT = 120
@@ -35,6 +38,22 @@ def run(*arguments, stdin="", cwd=None, **environment):
         stderr = threads.submit(_read, stderr_reader)
         status = _end(process)
     return status, stdout.result().decode(), stderr.result().decode()
+
+
+def run_here(*arguments, stdin=""):
+    """Run mdfconv in this process, where faults can be injected; return as `run`."""
+    before = sys.argv, sys.stdin, sys.stdout, sys.stderr
+    out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
+    sys.argv = ["mdfconv", *map(str, arguments)]
+    sys.stdin = io.TextIOWrapper(io.BytesIO(stdin.encode()), "utf-8")
+    sys.stdout, sys.stderr = out, err
+    try:
+        main()
+    except SystemExit as end:
+        status = end.code
+    finally:
+        sys.argv, sys.stdin, sys.stdout, sys.stderr = before
+    return status, *(stream.buffer.getvalue().decode() for stream in (out, err))
 
 
 def run_on_terminal(*arguments, **environment):

@@ -15,17 +15,18 @@ from pathlib import Path
 from threading import Thread
 
 import numpy as np
-import OpenImageIO
 import pytest
 import typer
 from matplotlib.figure import Figure
 from PIL import Image
 
 import mdfconv
-from mdfconv.cli import app, main
+from mdfconv.cli import app
 from mdfconv.output import files as output_files
 from mdfconv.reports import build as report
 from mdfconv.reports.artefact import Artefact
+from tests.cli.runner import run_here as run
+from tests.light.maps import room, write_map
 
 GROUP = typer.main.get_command(app)
 # How help shows what an option takes that names what is written.
@@ -144,23 +145,7 @@ def _here(tmp_path, monkeypatch):
     beta = np.linspace(0, 1.5, 20)
     rows = [f"{angle},{np.exp(-np.square(np.tan(angle) / 0.3))}" for angle in beta]
     Path("lobe.csv").write_text("\n".join(["beta_radians,value", *rows]))
-    light = OpenImageIO.ImageBuf(OpenImageIO.ImageSpec(128, 64, 3, "float"))
-    light.set_pixels(light.roi, np.random.default_rng(1).random((64, 128, 3), np.float32))
-    light.write("map.exr")
-
-
-def run(*words):
-    """Run the command line in this process; return its status and what it wrote."""
-    before = sys.argv, sys.stdout, sys.stderr
-    out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
-    sys.argv, sys.stdout, sys.stderr = ["mdfconv", *map(str, words)], out, err
-    try:
-        main()
-    except SystemExit as end:
-        status = end.code
-    finally:
-        sys.argv, sys.stdout, sys.stderr = before
-    return status, *(stream.buffer.getvalue().decode() for stream in (out, err))
+    write_map(Path("map.exr"), room())
 
 
 def state():

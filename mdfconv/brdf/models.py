@@ -25,11 +25,12 @@ from mdfconv.registry import Registry
 
 @dataclass(frozen=True)
 class _Definition:
-    """A BRDF by name: how it is built, and the one option that it has."""
+    """A BRDF by name: how it is built, the one option that it has, and its distribution."""
 
     name: str
     build: Callable[..., FurnaceModel]
     option: str = ""
+    distribution: str = ""
 
 
 _REGISTRY: Registry[_Definition] = Registry("BRDF")
@@ -70,6 +71,11 @@ def furnace_model(
     return definition.build(float(parameter), **chosen)
 
 
+def model_distribution(name: str) -> str:
+    """Return the distribution whose parameter a BRDF takes; "" for an exponent of Phong's."""
+    return _REGISTRY[name].distribution
+
+
 def list_models() -> list[str]:
     """Return the names of the BRDFs."""
     return _REGISTRY.names
@@ -85,13 +91,24 @@ def _microfacets(name: str) -> Callable[..., FurnaceModel]:
 
 
 def _with_distribution(
-    name: str, brdf: Callable[[Microsurface, Fresnel], Brdf]
-) -> Callable[..., FurnaceModel]:
+    name: str, mdf: str, brdf: Callable[[Microsurface, Fresnel], Brdf]
+) -> _Definition:
     def build(parameter: float) -> FurnaceModel:
-        surface = Microsurface(distribution(name), parameter)
+        surface = Microsurface(distribution(mdf), parameter)
         return _facet_model(brdf(surface, lossless), surface)
 
-    return build
+    return _Definition(name, build, distribution=mdf)
+
+
+def _register(definition: _Definition) -> None:
+    """Register a BRDF, under all names of its distribution if it has that of one."""
+    name, owner = definition.name, definition.distribution
+    if owner == name:
+        mdf = distribution(name)
+        _REGISTRY.add(name, definition, mdf.aliases, mdf.meant_by)
+    else:
+        phong = distribution("blinn-phong").meant_by if not owner else {}
+        _REGISTRY.add(name, definition, meant_by=dict.fromkeys(phong, "phong"))
 
 
 def _facet_model(brdf: Brdf, surface: Microsurface) -> FurnaceModel:
@@ -131,14 +148,12 @@ def _mirror_model(brdf: Brdf, exponent: float) -> FurnaceModel:
 
 
 for _definition in (
-    _Definition("ggx", _microfacets("ggx"), "masking"),
-    _Definition("beckmann", _microfacets("beckmann"), "masking"),
+    _Definition("ggx", _microfacets("ggx"), "masking", "ggx"),
+    _Definition("beckmann", _microfacets("beckmann"), "masking", "beckmann"),
     _Definition("phong", _original_phong),
     _Definition("modified-phong", _modified_phong, "normalizer"),
-    _Definition("smoothie", _with_distribution("smoothie", reflection.smoothie)),
-    _Definition("smoothie-approx", _with_distribution("smoothie", reflection.smoothie_approx)),
-    _Definition(
-        "ashikhmin-shirley", _with_distribution("ashikhmin-shirley", reflection.ashikhmin_shirley)
-    ),
+    _with_distribution("smoothie", "smoothie", reflection.smoothie),
+    _with_distribution("smoothie-approx", "smoothie", reflection.smoothie_approx),
+    _with_distribution("ashikhmin-shirley", "ashikhmin-shirley", reflection.ashikhmin_shirley),
 ):
-    _REGISTRY.add(_definition.name, _definition)
+    _register(_definition)

@@ -17,8 +17,8 @@ from typer.core import TyperCommand, TyperGroup
 
 from mdfconv import __version__
 from mdfconv.cli.completion import whole_words
-from mdfconv.cli.numbers import percent_hint
 from mdfconv.cli.process import run
+from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 from mdfconv.registry import unknown_name
 

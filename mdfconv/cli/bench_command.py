@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import completion
+from mdfconv.cli.names import asked_endpoint
 from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import console, form_of, progress, table_text, write_table
@@ -114,10 +115,9 @@ def _task(
 ) -> Task:
     from mdfconv.benchmark.measure import Task
     from mdfconv.benchmark.timing import FULL, QUICK
-    from mdfconv.conversion.endpoint import one_parameter_endpoint
     from mdfconv.distributions import one_parameter_distribution, one_parameter_distributions
 
-    end = one_parameter_endpoint(reference)
+    end = asked_endpoint(reference)
     return Task(
         reference=end.distribution,
         parameters=_lobes(end, parameter),

@@ -62,6 +62,20 @@ def texels(incomplete: str) -> list[str]:
     return [*endpoints(incomplete), *stored]
 
 
+def library_targets() -> list[str]:
+    """Return what a material library is converted to."""
+    from mdfconv.scene.mtl import To
+
+    return list(To)
+
+
+def scene_targets() -> list[str]:
+    """Return the distributions to which a scene is converted."""
+    from mdfconv.scene.mitsuba_scene import TARGETS
+
+    return list(TARGETS)
+
+
 def methods() -> list[str]:
     """Return the names of the conversion methods."""
     from mdfconv.conversion import list_methods
@@ -83,11 +97,15 @@ def languages() -> list[str]:
     return LANGUAGES.names
 
 
-def furnace_brdfs() -> list[str]:
-    """Return the BRDFs that the furnace takes."""
-    from mdfconv.brdf.models import list_models
+def furnace_brdfs(incomplete: str) -> list[str]:
+    """Return the BRDFs that the furnace takes; once a colon is typed, the forms of a parameter."""
+    from mdfconv.brdf.models import list_models, model_distribution
 
-    return list_models()
+    brdf, colon, _ = incomplete.partition(_COLON)
+    if not colon:
+        return list_models()
+    owner = model_distribution(brdf) if brdf in list_models() else ""
+    return [f"{brdf}{form.removeprefix(owner)}" for form in _encoded(owner)]
 
 
 def normalizers() -> list[str]:

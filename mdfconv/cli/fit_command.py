@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli import completion
+from mdfconv.cli.names import in_asked_forms, noted
 from mdfconv.cli.options import (
     ForceOption,
     Format,
@@ -27,8 +29,10 @@ from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import form_of, progress, tell, write_table
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import cell_text
+from mdfconv.registry import ALL
 
 if TYPE_CHECKING:
+    from mdfconv.conversion.endpoint import Endpoint
     from mdfconv.distributions import Distribution
     from mdfconv.measured.analysis import Analysis, FitOptions
     from mdfconv.measured.readers import ReadOptions
@@ -84,7 +88,13 @@ def command(
     ],
     targets: Annotated[
         list[str] | None,
-        typer.Option("--to", metavar="MDF", help="Distribution to fit; repeatable; default all."),
+        typer.Option(
+            "--to",
+            metavar="MDF",
+            autocompletion=completion.targets,
+            help="Distribution to fit, or the form in which its parameter is printed, such as "
+            "ggx:roughness; repeatable; default all.",
+        ),
     ] = None,
     quantity: Annotated[
         Quantity | None,
@@ -202,8 +212,9 @@ def command(
     outputs = Outputs(png, report, table=output, force=force, inputs=files)
     if len(files) > 1 and (png or report):
         raise MdfconvError("--png and --report are of one file")
+    ends = _ends(targets or [])
     options = _options(
-        targets, gamma, _model(loss, masking, fresnel, robust=robust), quantity, max_angle,
+        ends, gamma, _model(loss, masking, fresnel, robust=robust), quantity, max_angle,
         tolerance, separate=separate,
     )  # fmt: skip
     columns = ReadOptions(
@@ -213,7 +224,7 @@ def command(
     only_two = bool(masking or fresnel or robust or loss is Loss.cosine)
     analyses = _analyses(files, columns, options, only_two=only_two)
     form = form_of(format_, output)
-    names, rows = _table(analyses, form, separate)
+    names, rows = _table(analyses, form, ends, separate)
     contents: dict[Path, bytes] = {}
     logarithms = loss is Loss.log
     if png:
@@ -221,7 +232,7 @@ def command(
 
         contents[png] = draw_analysis(analyses[0], logarithms=logarithms)
     if report:
-        contents |= _report(analyses[0], report, separate=separate, logarithms=logarithms)
+        contents |= _report(analyses[0], report, ends, separate=separate, logarithms=logarithms)
     title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
     minor = [*_SECOND, *(name for name in names if name not in _CHIEF + _SECOND)]
     write_table(names, rows, form, outputs, beside=contents, title=title, secondary=minor)
@@ -237,7 +248,7 @@ def _model(loss: Loss, masking: Masking | None, fresnel: str | None, *, robust: 
 
 
 def _options(
-    targets: list[str] | None,
+    ends: Sequence[Endpoint],
     gamma: str | None,
     model: Any,
     quantity: Quantity | None,
@@ -251,7 +262,7 @@ def _options(
     fixed = chosen_gamma(gamma)
     shape = fixed if isinstance(fixed, float) else None
     return FitOptions(
-        targets=tuple(_targets(targets, shape)),
+        targets=tuple(_targets(ends, shape)),
         gamma=shape,
         model=model,
         quantity=quantity.value if quantity else None,
@@ -294,7 +305,7 @@ def _analyse(path: Path, columns: ReadOptions, options: FitOptions, *, only_two:
 
 
 def _table(
-    analyses: Sequence[Analysis], form: Format, separate: bool
+    analyses: Sequence[Analysis], form: Format, ends: Sequence[Endpoint], separate: bool
 ) -> tuple[list[str], list[dict[str, Any]]]:
     """Return the names of the columns and a row for each fit."""
     rows = []
@@ -302,19 +313,20 @@ def _table(
         file = {"file": analysis.name} if len(analyses) > 1 else {}
         for result in analysis.results:
             channel = {"channel": result.samples.channels[0]} if separate else {}
-            rows += [file | channel | record for record in result.records()]
+            records = in_asked_forms(result.records(), ends)
+            rows += [file | channel | record for record in records]
     names = list(dict.fromkeys(name for row in rows for name in row))
     rows = [{name: row.get(name) for name in names} for row in rows]
     return names, _shown(rows, form)
 
 
 def _report(
-    analysis: Analysis, path: Path, *, separate: bool, logarithms: bool
+    analysis: Analysis, path: Path, ends: Sequence[Endpoint], *, separate: bool, logarithms: bool
 ) -> dict[Path, bytes]:
     from mdfconv.reports.fit_pages import report_of
     from mdfconv.reports.fit_report import report_files
 
-    names, rows = _table([analysis], Format.markdown, separate)
+    names, rows = _table([analysis], Format.markdown, ends, separate)
     if "specular" in names:
         names = [name for name in names if name in _CHIEF + _SECOND]
         names = [name for name in names if any(row[name] != "" for row in rows)]
@@ -346,23 +358,30 @@ def _tell(analysis: Analysis, tolerance: float, *, named: bool) -> None:
         )
 
 
-def _targets(names: list[str] | None, gamma: float | None) -> list[Distribution]:
+def _ends(names: Sequence[str]) -> list[Endpoint]:
+    """Return what is named, each once; nothing for all."""
+    from mdfconv.conversion.endpoint import endpoint
+
+    if ALL in [name.strip().lower() for name in names]:
+        return []
+    return list({end.label: end for end in (noted(endpoint(name)) for name in names)}.values())
+
+
+def _targets(ends: Sequence[Endpoint], gamma: float | None) -> list[Distribution]:
     """Return the distributions to fit: of all those that a given γ leaves legal.
 
     Raises
     ------
     MdfconvError
-        If a name is unknown, or γ is given and means nothing for those that are named.
+        If γ is given and means nothing for those that are named.
     """
     import numpy as np
 
-    from mdfconv.distributions import distribution, one_parameter_distributions
+    from mdfconv.distributions import one_parameter_distributions
 
-    every = not names or "all" in [name.lower() for name in names]
-    if every:
-        targets = one_parameter_distributions()
-    else:
-        targets = list(dict.fromkeys(distribution(name) for name in names or ()))
+    every = not ends
+    named = list(dict.fromkeys(end.distribution for end in ends))
+    targets = named or one_parameter_distributions()
     if gamma is None:
         return targets
     second = [target for target in targets if target.second_parameter]

@@ -18,6 +18,7 @@ from mdfconv.cli.options import (
 )
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import progress, write_table
+from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
@@ -153,7 +154,8 @@ def _sweep_ends(text: str) -> tuple[float, float, int]:
         low, high, count = text.split(":")
         ends = float(low), float(high), int(count)
     except ValueError:
-        raise MdfconvError(f"--sweep takes LO:HI:COUNT, such as 0.001:1:10, not '{text}'") from None
+        reason = f"--sweep takes LO:HI:COUNT, such as 0.001:1:10, not '{text}'"
+        raise MdfconvError(reason, percent_hint(text, ":")) from None
     if not 1 <= ends[2] <= _LARGEST_SWEEP:
         raise MdfconvError(f"--sweep: COUNT is from 1 to {_LARGEST_SWEEP}")
     return ends

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import completion
+from mdfconv.cli.names import noted
 from mdfconv.cli.options import (
     ExposureOption,
     FixedGammaOption,
@@ -20,6 +21,7 @@ from mdfconv.cli.options import (
     refuse_given,
 )
 from mdfconv.cli.tables import write_table
+from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
@@ -92,7 +94,8 @@ def command(
             context, ["format_"], "is the form of the table of --all: a formula has --lang"
         )
     LANGUAGES[language]  # names are wrong more often than ranges
-    ends = endpoints(*with_specular(source, target, specular), fixed_gamma(gamma))
+    first, last = endpoints(*with_specular(source, target, specular), fixed_gamma(gamma))
+    ends = noted(first), noted(last)
     low, high = ends[0].stored.typical if range_ is None else _range(range_)
     problem = Problem(*ends, chosen_metric(metric, exposure), low, high)
     if every:
@@ -109,7 +112,7 @@ def _range(text: str) -> tuple[float, float]:
     except ValueError:
         colon = ""
     if not colon:
-        raise MdfconvError(f"--range is LO:HI, two numbers, not '{text}'")
+        raise MdfconvError(f"--range is LO:HI, two numbers, not '{text}'", percent_hint(text, ":"))
     return ends
 
 

@@ -42,7 +42,7 @@ def command(
             metavar="BRDF",
             autocompletion=completion.furnace_brdfs,
             help="phong, modified-phong, ggx, beckmann, smoothie, smoothie-approx or "
-            "ashikhmin-shirley.",
+            "ashikhmin-shirley; ggx:roughness takes PARAMETER for a stored form of α.",
         ),
     ] = "ggx",
     normalizer: Annotated[
@@ -119,7 +119,8 @@ def command(
     if seed < 0:
         raise MdfconvError(f"--seed is at least 0, not {seed}")
     outputs = Outputs(png, table=output, force=force)
-    model = furnace_model(brdf, parameter, normalizer=normalizer, masking=masking)
+    name, decoded = _decoded(brdf, parameter)
+    model = furnace_model(name, decoded, normalizer=normalizer, masking=masking)
     rows = _rows(model, np.linspace(0, 1, points), samples, seed)
     label = f"{brdf} {parameter:g}"
     picture = {}
@@ -130,6 +131,20 @@ def command(
         picture[png] = draw_albedo([row["cos_theta"] for row in rows], {"": curve})
     title = f"White furnace: {label}"
     write_table(list(rows[0]), rows, format_, outputs, beside=picture, title=title)
+
+
+def _decoded(brdf: str, value: float) -> tuple[str, float]:
+    """Return the name of a BRDF and its parameter, for one in a stored form, too."""
+    from mdfconv.brdf.models import model_distribution
+    from mdfconv.conversion.endpoint import endpoint
+
+    name, colon, form = brdf.partition(":")
+    if not colon:
+        return brdf, value
+    owner = model_distribution(name)
+    if not owner:
+        raise MdfconvError(f"the exponent of {name} has no stored form", f"did you mean {name}?")
+    return name, endpoint(f"{owner}:{form}").decode_one(value)
 
 
 def _rows(

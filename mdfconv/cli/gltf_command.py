@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli import completion
 from mdfconv.cli.material_files import (
     InPlaceOption,
     ReportFormat,
@@ -52,6 +53,7 @@ def command(
         typer.Option(
             "--from",
             metavar="MDF:PROGRAM",
+            autocompletion=completion.endpoints,
             help="What the program that wrote the file stored, such as blinn-phong:obj2gltf "
             "(mdfconv list --encodings has all).",
         ),
@@ -61,6 +63,7 @@ def command(
         typer.Option(
             "--to",
             metavar="MDF:ENCODING",
+            autocompletion=completion.endpoints,
             help="What the factors become; if not given ggx:roughness, as glTF defines them.",
         ),
     ] = None,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli import completion
 from mdfconv.cli.material_files import (
     MATERIALS_SHOWN,
     InPlaceOption,
@@ -41,7 +42,12 @@ def command(
     ],
     output: ResultOption = None,
     to: Annotated[
-        str, typer.Option(metavar="MDF", help="Distribution to convert to: ggx or beckmann.")
+        str,
+        typer.Option(
+            metavar="MDF",
+            autocompletion=completion.scene_targets,
+            help="Distribution to convert to: ggx or beckmann.",
+        ),
     ] = "ggx",
     metric: MetricOption = "environment",
     exposure: ExposureOption = None,

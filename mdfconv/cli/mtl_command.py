@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli import completion
 from mdfconv.cli.material_files import (
     InPlaceOption,
     ReportFormat,
@@ -51,7 +52,9 @@ def command(
     to: Annotated[
         str,
         typer.Option(
-            metavar="WHAT", help="roughness (Pr from Ns) or shininess (Ns from Pr, the inverse)."
+            metavar="WHAT",
+            autocompletion=completion.library_targets,
+            help="roughness (Pr from Ns) or shininess (Ns from Pr, the inverse).",
         ),
     ] = "roughness",
     metric: MetricOption = "environment",

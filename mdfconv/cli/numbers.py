@@ -7,9 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
-import numpy as np
-
-from mdfconv.distributions.parameter import number_text
+from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 
 Number: TypeAlias = float | tuple[float, float]
@@ -101,19 +99,3 @@ def _number(text: str, where: str) -> Number:
     if len(parts) > 2:
         raise MdfconvError(f"{where}'{text}' is not a pair X,Y")
     return (parts[0], parts[1]) if len(parts) == 2 else parts[0]
-
-
-def percent_hint(text: str) -> str:
-    """Return what is meant by a number of percent, or a pair of such; "" for other words."""
-    parts = [part.strip() for part in text.split(",")]
-    try:
-        numbers = [float(part.removesuffix("%")) for part in parts]
-    except ValueError:
-        return ""
-    if not any(part.endswith("%") for part in parts) or not np.isfinite(numbers).all():
-        return ""
-    shares = [
-        number / 100 if part.endswith("%") else number
-        for part, number in zip(parts, numbers, strict=True)
-    ]
-    return f"did you mean {','.join(map(number_text, shares))}?"

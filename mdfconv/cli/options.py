@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.numbers import percent_hint
-from mdfconv.cli.process import tell
+from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
     from mdfconv.conversion.arrays import Gamma
-    from mdfconv.conversion.endpoint import Endpoint
     from mdfconv.fitting.metrics import Metric
 
 # Of a page a hundred million pixels, a third of a gigabyte.
@@ -51,15 +49,6 @@ ToOption = Annotated[
         metavar="MDF",
         autocompletion=completion.targets,
         help="Distribution to convert to, as for --from.",
-    ),
-]
-MdfOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--mdf",
-        metavar="MDF",
-        autocompletion=completion.distributions,
-        help="Only this distribution; repeatable.",
     ),
 ]
 MethodOption = Annotated[
@@ -177,24 +166,6 @@ def refuse_idle_metric(context: typer.Context, method: str | None) -> None:
 
         if not method_named(method).follows_metric:
             refuse_given(context, ["metric"], f"goes with a fit, not with --method {method}")
-
-
-def asked_endpoint(name: str) -> Endpoint:
-    """Return the distribution of one parameter and its form that an option names.
-
-    What to know of the name goes to standard error.
-
-    Raises
-    ------
-    MdfconvError
-        As `one_parameter_endpoint`.
-    """
-    from mdfconv.conversion.endpoint import one_parameter_endpoint
-
-    end = one_parameter_endpoint(name)
-    if end.caution:
-        tell(f"note: {end.caution}")
-    return end
 
 
 def chosen_metric(name: str, exposure: float | None = None) -> Metric:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mdfconv.cli import completion
+from mdfconv.cli.names import asked_endpoint, in_asked_forms
 from mdfconv.cli.options import (
     DpiOption,
     ExposureOption,
     FolderOption,
     ForceOption,
     FormatOption,
-    MdfOption,
     MethodOption,
     OptionalMetricOption,
     asked_metric,
@@ -26,6 +27,7 @@ from mdfconv.errors import MdfconvError
 from mdfconv.output.files import file_bytes
 
 if TYPE_CHECKING:
+    from mdfconv.conversion.endpoint import Endpoint
     from mdfconv.fitting.metrics import Metric
     from mdfconv.paper.error_curves import Curves
 
@@ -50,7 +52,15 @@ def command(
             help="Distribution that the errors are taken against.",
         ),
     ] = _REFERENCE,
-    mdf: MdfOption = None,
+    mdf: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="MDF",
+            autocompletion=completion.endpoints,
+            help="Only this distribution, or the form in which its parameter is printed, such as "
+            "ggx:roughness; repeatable.",
+        ),
+    ] = None,
     output: FolderOption = None,
     force: ForceOption = False,
     png: Annotated[bool, typer.Option("--png/--no-png", help="Write pictures.")] = True,
@@ -81,7 +91,8 @@ def command(
         refuse_given(context, ["dpi", "log"], "is of pictures: give no --no-png, or --svg")
     asked = asked_metric(metric, exposure)
     chief = one_parameter_distribution(reference).name
-    sets = _sets(m_b, method, asked, chief, mdf)
+    ends = [asked_endpoint(name) for name in mdf or ()]
+    sets = _sets(m_b, method, asked, chief, ends)
     endings = [*[".png"] * png, *[".svg"] * svg, *["b.csv"] * csv]
     folder = check_folder(output)
     outputs = Outputs(*(folder / f"{name}{end}" for name in sets for end in endings), force=force)
@@ -92,7 +103,11 @@ def command(
         for name, drawn in figures.items()
         for end in endings
     }
-    rows = [{"figure": name} | row for name, drawn in figures.items() for row in drawn.maxima()]
+    rows = [
+        {"figure": name} | row
+        for name, drawn in figures.items()
+        for row in in_asked_forms(drawn.maxima(), ends)
+    ]
     title = f"Largest error against {chief}"
     write_table(_COLUMNS, rows, format_, outputs, beside=contents, title=title)
 
@@ -102,12 +117,12 @@ def _sets(
     method: str | None,
     metric: Metric | None,
     chief: str,
-    mdf: list[str] | None,
+    ends: Sequence[Endpoint],
 ) -> dict[str, dict[str, float]]:
     """Return the parameters of each figure by its name."""
     from mdfconv.paper.error_curves import DRAWN, PAPER_SETS, parameters_for
 
-    names = list(dict.fromkeys(one_parameter_distribution(name).name for name in mdf or ()))
+    names = list(dict.fromkeys(end.distribution.name for end in ends))
     if m_b:
         names = names or [name for name in (_REFERENCE, *DRAWN) if name != chief]
         wanted = dict.fromkeys([chief, *names])

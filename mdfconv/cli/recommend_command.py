@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli.names import asked_endpoint
 from mdfconv.cli.options import (
     ExposureOption,
     FixedGammaOption,
@@ -71,13 +72,13 @@ def command(
     mdfconv recommend --from ggx:roughness 0.5 --tolerance 0.1 --metric display --format json
     """
     from mdfconv.benchmark.recommendation import recommend
-    from mdfconv.conversion.endpoint import one_parameter_endpoint, with_gamma
+    from mdfconv.conversion.endpoint import with_gamma
     from mdfconv.distributions import one_parameter_distributions
 
-    end = with_gamma(one_parameter_endpoint(source), fixed_gamma(gamma))
+    end = with_gamma(asked_endpoint(source), fixed_gamma(gamma))
     kept = chosen_metric(metric, exposure)
     recommendation = recommend(
-        end.distribution, float(end.decode(value)), one_parameter_distributions(), kept, tolerance
+        end.distribution, end.decode_one(value), one_parameter_distributions(), kept, tolerance
     )
     asked = {"from": end.label, "value": value, "metric": str(kept), "tolerance": tolerance}
     _write(recommendation, asked, form_of(format_, in_pipe=Format.plain))

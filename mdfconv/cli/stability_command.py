@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli.options import ForceOption, FormatOption, MdfOption, OutputOption
+from mdfconv.cli import completion
+from mdfconv.cli.options import ForceOption, FormatOption, OutputOption
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 
@@ -26,7 +27,14 @@ def command(
     format_: FormatOption = None,
     output: OutputOption = None,
     force: ForceOption = False,
-    mdf: MdfOption = None,
+    mdf: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="MDF",
+            autocompletion=completion.distributions,
+            help="Only this distribution; repeatable.",
+        ),
+    ] = None,
     part: Annotated[Part | None, typer.Option(help="Only this part.")] = None,
 ) -> None:
     """Audit the hard cases: errors against 50-digit values, beside those of the printed formulas.

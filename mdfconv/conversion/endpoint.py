@@ -16,6 +16,8 @@ from mdfconv.errors import MdfconvError
 from mdfconv.registry import unknown_name
 
 DEFAULT_ENCODING = "alpha"
+# Of a parameter: the step over which the slope of an encoding is taken.
+_STEP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,15 @@ class Endpoint:
             stored = self.encoding.encode(parameter)
         accepted = self.stored.accepts(stored) | self.encoding.clamped(stored)
         return np.where(accepted, stored, np.nan)
+
+    def encode_one(self, parameter: float) -> tuple[float | None, float | None]:
+        """Return the stored value of a parameter and how much it changes with it, |ds/dp|.
+
+        Either is None where it cannot be stored.
+        """
+        value, below, above = self.encode(parameter * np.array([1, 1 - _STEP, 1 + _STEP])).tolist()
+        slope = abs(above - below) / (2 * _STEP * parameter)
+        return None if np.isnan(value) else value, None if np.isnan(slope) else slope
 
     def clamped(self, stored: Array) -> dict[str, Mask]:
         """Return what stored numbers stand for that have no inverse, in words, and which they are.
@@ -263,17 +274,17 @@ def _takes_specular(name: str) -> bool:
 
 
 def encodings_of(owner: Distribution) -> list[str]:
-    """Return the names of the forms in which a distribution's parameter is stored."""
+    """Return the names of the forms in which a parameter is stored; none if it has but one."""
+    own = [*(encoding.name for encoding in owner.encodings), *dialects_of(owner.name)]
     # Exponents are not an α.
-    plain = [] if owner.parameter.larger_is_smoother else [DEFAULT_ENCODING]
-    own = [encoding.name for encoding in owner.encodings]
-    return [*plain, *own, *dialects_of(owner.name)]
+    named_by_itself = own and not owner.parameter.larger_is_smoother
+    return [DEFAULT_ENCODING, *own] if named_by_itself else own
 
 
 def _encoding(owner: Distribution, name: str) -> Encoding | None:
     key, _, setting = (part.strip().lower() for part in name.partition(":"))
     known = encodings_of(owner)
-    if known in ([], [DEFAULT_ENCODING]):
+    if not known:
         raise MdfconvError(
             f"{owner.name} has no encoding '{name}': its {owner.parameter.name} "
             f"{owner.parameter.symbol} is given as it is"

@@ -67,13 +67,20 @@ def distribution(name: str) -> Distribution:
     Raises
     ------
     MdfconvError
-        If the name is not known; the message offers the nearest ones.
+        If the name is not known; the message offers the nearest ones. Also if it is that of a
+        stored form, such as ``"ggx:roughness"``.
 
     Examples
     --------
     >>> distribution("Trowbridge_Reitz").name
     'ggx'
     """
+    if isinstance(name, str) and ":" in name:
+        owner = _REGISTRY[name.partition(":")[0]].name
+        raise MdfconvError(
+            f"'{name}' is a stored form of a parameter, and here a distribution is meant",
+            f"did you mean {owner}?",
+        )
     return _REGISTRY[name]
 
 

@@ -14,7 +14,14 @@ from enum import StrEnum
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
-from mdfconv.distributions.parameter import ROUGHNESS, Clamp, Encoding, Pairing, Parameter
+from mdfconv.distributions.parameter import (
+    ROUGHNESS,
+    Clamp,
+    Encoding,
+    Pairing,
+    Parameter,
+    percent_hint,
+)
 from mdfconv.errors import MdfconvError
 
 # From stored number or parameter, and the specular weight, to the other.
@@ -154,7 +161,8 @@ class Dialect:
         try:
             weight = float(setting)
         except ValueError:
-            raise MdfconvError(f"a specular weight is a number, not '{setting}'") from None
+            reason = f"a specular weight is a number, not '{setting}'"
+            raise MdfconvError(reason, percent_hint(setting)) from None
         if not 0 < weight <= 1:
             raise MdfconvError(f"a specular weight is above 0 and at most 1, not {setting}")
         return weight

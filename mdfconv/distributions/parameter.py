@@ -18,6 +18,22 @@ def number_text(value: float) -> str:
     return f"{value:.10g}"
 
 
+def percent_hint(text: str, separator: str = ",") -> str:
+    """Return what is meant by a number of percent, or several of such; "" for other words."""
+    parts = [part.strip() for part in text.split(separator)]
+    try:
+        numbers = [float(part.removesuffix("%")) for part in parts]
+    except ValueError:
+        return ""
+    if not any(part.endswith("%") for part in parts) or not np.isfinite(numbers).all():
+        return ""
+    shares = [
+        number / 100 if part.endswith("%") else number
+        for part, number in zip(parts, numbers, strict=True)
+    ]
+    return f"did you mean {separator.join(map(number_text, shares))}?"
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One scalar parameter: its name, symbol and ranges.

@@ -18,6 +18,7 @@ from mdfconv.brdf.fresnel import dielectric, schlick_fresnel
 from mdfconv.brdf.masking import v_cavity
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
+from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.directional import DirectionalSamples
 from mdfconv.measured.lobe_fit import half_width_logarithms
@@ -29,6 +30,7 @@ from mdfconv.measured.projection import (
     standard_deviations,
     upper_triangle,
 )
+from mdfconv.registry import unknown_name
 
 LOSSES = ("linear", "log", "cosine")
 MASKINGS = ("smith", "v-cavity", "none")
@@ -191,7 +193,10 @@ def _index(text: str) -> float:
     except ValueError:
         index = 0.0
     if not 0 < index < np.inf:
-        raise MdfconvError(f"unknown Fresnel factor '{text}'", f"known: {', '.join(FRESNELS)}")
+        near = percent_hint(number)
+        if near:
+            raise MdfconvError(f"an index of refraction is a number, not '{number}'", near)
+        raise unknown_name("Fresnel factor", text, FRESNELS)
     return index
 
 

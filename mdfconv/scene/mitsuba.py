@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from mdfconv.distributions import distribution
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.material_files import FileConversion
@@ -189,7 +190,7 @@ def _conversion(
 
 def check_target(name: str) -> str:
     """Return the name of a target distribution; raise `MdfconvError` if Mitsuba 3 has none such."""
-    wanted = name.strip().lower()
+    wanted = distribution(name).name
     if wanted not in TARGETS:
         raise MdfconvError(
             f"a scene is not converted to '{name}': Mitsuba knows {' and '.join(TARGETS)} "

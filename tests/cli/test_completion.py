@@ -20,9 +20,9 @@ GROUP = typer.main.get_command(app)
 COMMANDS = GROUP.list_commands(None)
 # What these options take is not a name from a list.
 FREE = {
-    "gltf": {"--from", "--to", "--output"},
-    "mtl": {"--to", "--output"},
-    "mitsuba": {"--to", "--output"},
+    "gltf": {"--output"},
+    "mtl": {"--output"},
+    "mitsuba": {"--output"},
     "fit": {
         "--gamma",
         "--angle",
@@ -75,6 +75,12 @@ def completed(words, number):
         (["convert", "--metric", "en"], 3, ["energy", "environment"]),
         (["convert", "--method", "f"], 3, ["fit", "fast"]),
         (["formula", "--lang", "h"], 3, ["hlsl"]),
+        (["furnace", "--brdf", "ph"], 3, ["phong"]),
+        (["furnace", "--brdf", "ggx", ":", "rou"], 5, ["roughness"]),
+        (["furnace", "--brdf", "phong", ":", "re"], 5, []),
+        (["mtl", "--to", "s"], 3, ["shininess"]),
+        (["mitsuba", "--to", "b"], 3, ["beckmann"]),
+        (["gltf", "--from", "blinn-phong", ":", "obj2"], 5, ["obj2gltf"]),
         (["texture", "--from", "blinn-phong", ":", "l"], 5, ["log2"]),
         (["convert", "--to", "konvert", ":", "l"], 5, []),
     ],
@@ -98,7 +104,7 @@ def test_every_metric_and_language_is_offered():
     assert completion.languages() == LANGUAGES.names
 
 
-@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "fit"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_option_that_takes_a_name_completes(command):
     context = typer.Context(GROUP)
     for option in GROUP.get_command(context, command).get_params(context):

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
-from mdfconv.distributions.parameter import Parameter, number_text
+from mdfconv.distributions.parameter import Parameter, number_text, percent_hint
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics.base import Metric
 from mdfconv.fitting.metrics.energy import Energy
@@ -51,7 +51,8 @@ class Display(Energy):
             raise
         except ValueError:
             raise MdfconvError(
-                f"the exposure of the display metric is a number, not '{text}'"
+                f"the exposure of the display metric is a number, not '{text}'",
+                percent_hint(text),
             ) from None
 
     def __str__(self) -> str:

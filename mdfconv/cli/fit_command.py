@@ -212,6 +212,10 @@ def command(
     outputs = Outputs(png, report, table=output, force=force, inputs=files)
     if len(files) > 1 and (png or report):
         raise MdfconvError("--png and --report are of one file")
+    if report:
+        from mdfconv.reports.fit_report import check_report_name
+
+        check_report_name(report)
     ends = _ends(targets or [])
     options = _options(
         ends, gamma, _model(loss, masking, fresnel, robust=robust), quantity, max_angle,

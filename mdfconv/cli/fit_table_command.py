@@ -81,14 +81,14 @@ def command(
             "--compare and --closed-forms speak of the paper's rows: give one of them, without "
             "--sweep, --m-b or --extended"
         )
-    outputs = Outputs(table=output, force=force)
+    kept = chosen_metric(metric, exposure)
+    outputs = Outputs(table=output, force=force, inputs=kept.inputs)
     if closed_forms:
         refuse_given(context, ["metric"], "does not go with --closed-forms, which has every metric")
         columns, rows, title = _closed_forms(exposure)
         minor = ["formula", "worst_printed", "printed"]
         write_table(columns, rows, format_, outputs, title=title, secondary=minor)
         return
-    kept = chosen_metric(metric, exposure)
     if compare and kept.name != "unit":
         raise MdfconvError("--compare: the paper's table has the unit metric only")
     if compare:

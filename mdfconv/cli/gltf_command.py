@@ -181,6 +181,7 @@ def _convert(
         output,
         in_place=in_place,
         force=force,
+        metric=metric,
         convert=convert,
         report=lambda converted: _report(converted, metric, names, form=form, compare=compare),
     )

@@ -61,6 +61,7 @@ def convert_files(
     *,
     in_place: bool,
     force: bool,
+    metric: Metric,
     convert: Callable[[Destination, bytes], Conversion],
     report: Callable[[list[tuple[Destination, Conversion]]], None],
 ) -> None:
@@ -76,6 +77,8 @@ def convert_files(
         Whether the files themselves change.
     force : bool
         Whether files that exist are replaced.
+    metric : Metric
+        What the conversions keep.
     convert : callable
         From where a file goes, and its bytes, to its conversion.
     report : callable
@@ -93,7 +96,7 @@ def convert_files(
     files = find_files(patterns)
     destinations = choose_outputs(files, output, in_place=in_place)
     results = [[] if each.backup else [each.output] for each in destinations]
-    Outputs(*chain(*results), force=force, inputs=files)
+    Outputs(*chain(*results), force=force, inputs=[*files, *metric.inputs])
     converted = []
     for destination, result in zip(destinations, results, strict=True):
         data = read_file(destination.source)
@@ -101,7 +104,8 @@ def convert_files(
         if conversion.files and is_stream(destination.output):
             raise MdfconvError(f"no texture can stand beside {destination.output}: it is no file")
         # Which textures there are is known only now.
-        Outputs(*result, *conversion.files, force=force, inputs=[*files, *conversion.inputs])
+        inputs = *files, *metric.inputs, *conversion.inputs
+        Outputs(*result, *conversion.files, force=force, inputs=inputs)
         converted.append((destination, data, conversion))
     written = write_conversions(converted, force=force)
     report([(destination, conversion) for destination, _, conversion in converted])

@@ -102,7 +102,15 @@ def command(
             record = _record(*each, wanted, kept, compare=compare, most=MATERIALS_SHOWN)
             _print_report(record, len(each[1].materials))
 
-    convert_files(scenes, output, in_place=in_place, force=force, convert=convert, report=report)
+    convert_files(
+        scenes,
+        output,
+        in_place=in_place,
+        force=force,
+        metric=kept,
+        convert=convert,
+        report=report,
+    )
 
 
 def _record(

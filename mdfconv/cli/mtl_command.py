@@ -122,6 +122,7 @@ def command(
         output,
         in_place=in_place,
         force=force,
+        metric=kept,
         convert=convert,
         report=lambda converted: _report(converted, kept, form=format_, compare=compare),
     )

@@ -117,11 +117,12 @@ def command(
 
     _check_given(context, source, target)
     refuse_idle_metric(context, method)
-    outputs = Outputs(output, png, force=force, inputs=[source_file])
+    kept = chosen_metric(metric, exposure)
+    outputs = Outputs(output, png, force=force, inputs=[source_file, *kept.inputs])
     rule = TextureRule(
         *with_specular(source, target, specular),
         method,
-        str(chosen_metric(metric, exposure)),
+        str(kept),
         exponent_max,
         log2_scale,
         fixed_gamma(gamma),

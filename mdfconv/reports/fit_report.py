@@ -53,24 +53,25 @@ class FitReport:
     command: str
 
 
+def check_report_name(path: Path) -> None:
+    """Raise `MdfconvError` if a report's name ends in neither ``.html`` nor ``.md``."""
+    if path.suffix.lower() not in _FORMS:
+        raise MdfconvError(f"a report is an .html or a .md file, not {path.name}")
+
+
 def report_files(report: FitReport, path: Path) -> dict[Path, bytes]:
     """Return the files of a report: one of HTML, or of Markdown with pictures beside it.
 
     Raises
     ------
     MdfconvError
-        If the name ends in neither ``.html`` nor ``.md``.
+        As `check_report_name`.
     """
-    suffix = path.suffix.lower()
-    if suffix in (".html", ".htm"):
-        return {path: html_page(report)}
-    if suffix == ".md":
-        return _markdown(report, path)
-    raise MdfconvError(f"a report is an .html or a .md file, not {path.name}")
+    check_report_name(path)
+    return _FORMS[path.suffix.lower()](report, path)
 
 
-def html_page(report: FitReport) -> bytes:
-    """Return the report as one file of HTML that needs no other."""
+def _page(report: FitReport, path: Path) -> dict[Path, bytes]:
     escape = html.escape
     columns = list(report.rows[0])
     head = "".join(f"<th>{escape(column)}</th>" for column in columns)
@@ -88,7 +89,7 @@ def html_page(report: FitReport) -> bytes:
         f'src="data:image/png;base64,{base64.b64encode(data).decode()}">\n'
         for name, data in report.pictures.items()
     )
-    return file_bytes(
+    page = (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta name="viewport" content="width=device-width">\n'
         f"<title>{escape(report.title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
@@ -100,6 +101,7 @@ def html_page(report: FitReport) -> bytes:
         f"<h2>Made by</h2>\n<pre>{escape(report.command)}</pre>\n<p>mdfconv {__version__}</p>\n"
         "</body>\n</html>"
     )
+    return {path: file_bytes(page)}
 
 
 def snippets_of(mdf: Distribution, parameter: float) -> dict[str, str]:
@@ -146,6 +148,8 @@ def _markdown(report: FitReport, path: Path) -> dict[Path, bytes]:
     ]
     return {path: file_bytes("\n\n".join(parts)), **files}
 
+
+_FORMS = {".html": _page, ".htm": _page, ".md": _markdown}
 
 _STYLE = """
 :root { color-scheme: light dark; }

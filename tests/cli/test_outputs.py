@@ -240,6 +240,15 @@ def test_an_input_is_not_written_over(name, option):
         assert state() == before
 
 
+@pytest.mark.parametrize("name", ["mtl", "gltf", "mitsuba", "texture", "fit-table"])
+def test_the_map_of_a_metric_is_not_written_over(name):
+    before = state()
+    words = *CASES[name].words, "--metric", "light:map.exr", "--output", "./map.exr", "--force"
+    refusal = "mdfconv: map.exr is the input; write to another file\n"
+    assert run(*words) == (2, "", refusal)
+    assert state() == before
+
+
 @pytest.mark.parametrize(
     ("name", "option"),
     [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from pathlib import Path
 from typing import ClassVar, Self
 
 import numpy as np
@@ -35,6 +36,8 @@ class Metric(ABC):
         Whether D is the normalized or the unit form.
     kinks : tuple of float
         Values of D/P at which S is not smooth.
+    inputs : tuple of Path
+        Files that it was read from.
     setting : str
         What may follow the name and a colon, in a word; "" for nothing.
     needs_setting : bool
@@ -53,6 +56,7 @@ class Metric(ABC):
     quantity: ClassVar[str]
     normalized: ClassVar[bool]
     kinks: tuple[float, ...] = ()
+    inputs: tuple[Path, ...] = ()
     setting: ClassVar[str] = ""
     needs_setting: ClassVar[bool] = False
     over_angles: ClassVar[bool] = True

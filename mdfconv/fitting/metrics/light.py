@@ -45,6 +45,7 @@ class Light(Metric):
 
     def __init__(self, spectrum: Spectrum, label: str = "") -> None:
         self.spectrum, self._label = spectrum, label
+        self.inputs = (Path(label),) if label else ()
         self._lobes = _lobe_spectrum(spectrum.highest)
         self._weight = self._lobes.count * spectrum.at(self._lobes.degree)
 

@@ -108,6 +108,20 @@ def furnace_brdfs(incomplete: str) -> list[str]:
     return [f"{brdf}{form.removeprefix(owner)}" for form in _encoded(owner)]
 
 
+def fresnel_factors() -> list[str]:
+    """Return the Fresnel factors that are fitted; an index is a number of one's own."""
+    from mdfconv.measured.brdf_fit import FRESNELS
+
+    return [name.removesuffix("N") for name in FRESNELS]
+
+
+def angle_units() -> list[str]:
+    """Return the units in which files may give angles."""
+    from mdfconv.measured.samples import UNITS
+
+    return list(UNITS)
+
+
 def normalizers() -> list[str]:
     """Return the normalizers of modified Phong."""
     from mdfconv.brdf.phong import NORMALIZERS

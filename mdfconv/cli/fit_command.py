@@ -121,7 +121,9 @@ def command(
     angle_unit: Annotated[
         str | None,
         typer.Option(
-            metavar="UNIT", help="degrees, radians or cosine; by default from the header."
+            metavar="UNIT",
+            autocompletion=completion.angle_units,
+            help="degrees, radians or cosine; by default from the header.",
         ),
     ] = None,
     values: Annotated[
@@ -162,6 +164,7 @@ def command(
         str | None,
         typer.Option(
             metavar="F",
+            autocompletion=completion.fresnel_factors,
             help="Of two directions: none (default), schlick (F₀ 0.04), ior:N, or fit (F₀ free).",
         ),
     ] = None,

@@ -84,7 +84,7 @@ class BrdfModel:
         for name, known in (("loss", LOSSES), ("masking", MASKINGS)):
             if getattr(self, name) not in known:
                 value = getattr(self, name)
-                raise MdfconvError(f"unknown {name} '{value}'", f"known: {', '.join(known)}")
+                raise unknown_name(name, value, known)
         if self.fresnel not in FRESNELS[:2] + FRESNELS[3:]:
             _index(self.fresnel)
 

@@ -16,6 +16,7 @@ from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.projection import Projection, log_rmse, model, standard_deviations
 from mdfconv.measured.samples import Samples
+from mdfconv.registry import unknown_name
 
 LOSSES = ("linear", "log")
 # Tangents of β_half from narrower than any measurement resolves to nearly uniform. Neighbours of
@@ -124,7 +125,7 @@ class _Problem:
 
     def __init__(self, data: Samples, target: Distribution, loss: str, gamma: float | None) -> None:
         if loss not in LOSSES:
-            raise MdfconvError(f"unknown loss '{loss}'", f"known: {', '.join(LOSSES)}")
+            raise unknown_name("loss", loss, LOSSES)
         self._log = loss == "log"
         second = target.second_parameter
         self._target = target if second is None or gamma is None else target.with_gamma(gamma)

@@ -13,6 +13,7 @@ from mdfconv.measured.readers.base import ReadOptions
 from mdfconv.measured.readers.columns import counts_rows, is_value, is_wavelength
 from mdfconv.measured.readers.tables import Table
 from mdfconv.measured.samples import UNITS
+from mdfconv.registry import unknown_name
 
 # What the name of a column says of its unit.
 _HINTS = {
@@ -109,7 +110,7 @@ def told_unit(options: ReadOptions, table: Table, columns: Collection[int]) -> s
         wanted = options.unit.lower().rstrip("s")
         known = [unit for unit in UNITS if unit.rstrip("s") == wanted]
         if not known:
-            raise MdfconvError(f"unknown angle unit '{options.unit}'", f"known: {', '.join(UNITS)}")
+            raise unknown_name("angle unit", options.unit, list(UNITS))
         return known[0]
     for unit, pattern in _HINTS.items():
         if any(pattern.search(f"{table.names[i]} {table.units[i]}") for i in columns):

@@ -21,6 +21,7 @@ from mdfconv.measured.readers.columns import Role, is_angle, is_counting, is_val
 from mdfconv.measured.readers.directions import directions
 from mdfconv.measured.readers.tables import Table, parse_table
 from mdfconv.measured.samples import UNITS, Samples, samples
+from mdfconv.registry import unknown_name
 
 # What an angle of a table of one angle can be.
 HALF, REFLECTED, INCIDENT = "half", "reflected", "incident"
@@ -50,7 +51,7 @@ def read_table(path: Path, table: Table, options: ReadOptions) -> Samples | Dire
     """
     meaning = options.angle_is
     if meaning not in (None, *_MEANINGS):
-        raise MdfconvError(f"unknown angle '{meaning}'", f"known: {', '.join(_MEANINGS)}")
+        raise unknown_name("angle", meaning, list(_MEANINGS))
     if options.angle is None and meaning is None:
         found = directions(path, table, options)
         if found is not None:

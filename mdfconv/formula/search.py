@@ -92,11 +92,13 @@ class Problem:
         pair = self.source.distribution, self.target.distribution
         best = fit(pair[0], parameter, pair[1], self.metric).parameter
         t = natural(self.target, self.target.encode(best))
-        if not np.isfinite(t).all():
-            missing = natural(self.source, w[~np.isfinite(t)])
+        # To 0, where a rule clamps, no error is relative.
+        answered = np.isfinite(t) & (t > 0)
+        if not answered.all():
+            missing = natural(self.source, w[~answered])
             raise MdfconvError(
-                f"the fit has no answer in {self.target.label} for {self.source.label} from "
-                f"{missing.min():.6g} to {missing.max():.6g}",
+                f"the fit has no answer in {self.target.label}, or only the end of its range, for "
+                f"{self.source.label} from {missing.min():.6g} to {missing.max():.6g}",
                 "narrow the range",
             )
         return w, t

@@ -12,6 +12,7 @@ import pytest
 
 from mdfconv.conversion.endpoint import Endpoint, endpoint, endpoints
 from mdfconv.distributions import list_distributions
+from mdfconv.distributions.dialects import DIALECTS, Specular
 from mdfconv.distributions.parameter import Encoding, Parameter
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.fit import fit
@@ -415,3 +416,26 @@ def test_mistakes(words, message):
     assert (status, out) == (2, "")
     assert message in err
     assert len(err.splitlines()) == 1
+
+
+CLAMPING_AT_0 = [
+    (f"{owner}:{dialect.name}{':0.5' if dialect.specular is Specular.needed else ''}")
+    for dialect in DIALECTS
+    if any(clamp.stored == 0 for clamp in dialect.clamps)
+    for owner in dialect.owners
+]
+
+
+@pytest.mark.parametrize("name", CLAMPING_AT_0)
+def test_to_a_clamped_0_there_is_no_formula(name):
+    """No error is relative to it; where a target does not clamp there is one."""
+    target, source = endpoint(name), endpoint("gauss")
+    metric = metric_named("energy")
+
+    def answer(low, high):
+        return cheapest(Problem(source, target, metric, low, high), 0.1).error
+
+    with pytest.raises(MdfconvError, match=r"has no answer in .* narrow the range") as refusal:
+        answer(1e-3, 0.5)
+    last = float(re.search(r" to (\S+);", str(refusal.value))[1])
+    assert answer(1.2 * last, 0.5) <= 0.1

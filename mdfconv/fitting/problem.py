@@ -190,7 +190,8 @@ class Problem:
             ends = [(mode, np.full_like(mode, 0.5 * np.pi))]
             if np.any(mode > 0):
                 ends.append((mode, np.zeros_like(mode)))
-            kinks += [level_crossing(distribution, parameter, level, *end) for end in ends]
+            with np.errstate(all="ignore"):  # as a lobe far beyond any screen's resolution is
+                kinks += [level_crossing(distribution, parameter, level, *end) for end in ends]
         return np.concatenate(kinks, axis=1) if kinks else None, distribution.edge(parameter)
 
 

@@ -120,10 +120,11 @@ class Problem:
 def is_glossy(end: Endpoint) -> bool:
     """Return whether an end stores a glossiness, for which 1 − it is the natural variable.
 
-    That is a number from 0 to 1 of which the larger is the smoother.
+    That is a number from 0 to 1 of which the larger is the smoother, and 1 a mirror.
     """
     stored = end.stored
-    return stored.larger_is_smoother and (stored.lower, stored.upper) == (0, 1)
+    ends = stored.lower, stored.upper
+    return stored.larger_is_smoother and ends == (0, 1) and not stored.upper_closed
 
 
 def natural(end: Endpoint, stored: Array) -> Array:

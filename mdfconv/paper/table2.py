@@ -165,7 +165,11 @@ def _read(name: str) -> list[dict[str, str]]:
 
 def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dict[str, Array]:
     """Return the columns of the table, in order."""
-    source, n_eq11 = distribution(_SOURCE), 2 / np.square(m_b)
+    source = distribution(_SOURCE)
+    with np.errstate(all="ignore"):
+        n_eq11 = 2 / np.square(m_b)
+    # An exponent that is none has no error either.
+    _check_answers(m_b, np.where(np.isfinite(n_eq11), n_eq11, np.nan), FITTED["n"])
     protocol = metric.name == Unit.name
     samples = UniformSamples(limit, SAMPLES) if protocol else None
     by_eq11 = source, m_b, distribution(FITTED["n"])

@@ -10,8 +10,8 @@ import subprocess
 import numpy as np
 import pytest
 
-from mdfconv.conversion.endpoint import Endpoint, endpoint, endpoints
-from mdfconv.distributions import list_distributions
+from mdfconv.conversion.endpoint import Endpoint, encodings_of, endpoint, endpoints
+from mdfconv.distributions import list_distributions, one_parameter_distributions
 from mdfconv.distributions.dialects import DIALECTS, Specular
 from mdfconv.distributions.parameter import Encoding, Parameter
 from mdfconv.errors import MdfconvError
@@ -416,6 +416,28 @@ def test_mistakes(words, message):
     assert (status, out) == (2, "")
     assert message in err
     assert len(err.splitlines()) == 1
+
+
+NEED_SPECULAR = {dialect.name for dialect in DIALECTS if dialect.specular is Specular.needed}
+FORMS = [
+    f"{mdf.name}:{form}{':0.5' if form in NEED_SPECULAR else ''}"
+    for mdf in one_parameter_distributions()
+    for form in encodings_of(mdf)
+]
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_every_form_is_a_source(name):
+    """Over its whole range, of which an end can be 0 or 1."""
+    source, target = endpoint(name), endpoint("gauss")
+    low, high = source.stored.typical
+    problem = Problem(source, target, metric_named("unit"), low, high)
+    code = {}
+    exec(write_formula(cheapest(problem, 0.1), problem, "python"), code)
+    stored = np.geomspace(low, high, 50).clip(low, high)
+    formula = next(value for key, value in code.items() if key.startswith(target.distribution.name))
+    exact = fit(source.distribution, source.decode(stored), target.distribution, problem.metric)
+    np.testing.assert_allclose(formula(stored), exact.parameter, rtol=0.11)
 
 
 CLAMPING_AT_0 = [

@@ -51,7 +51,7 @@ class _Command(TyperCommand):
         for word in args[: args.index("--")] if "--" in args else args:
             name = word.partition("=")[0]
             if len(word) > 1 and word[0] == "-" and name not in known and not _is_number(word):
-                near = get_close_matches(name, known, n=2, cutoff=0.7)
+                near = get_close_matches(name, known, n=2, cutoff=0.8)
                 hint = f"; did you mean {' or '.join(near)}?" if near else ""
                 raise MdfconvError(f"no such option: {name}{hint}")
         try:

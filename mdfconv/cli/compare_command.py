@@ -182,7 +182,7 @@ def command(
     scene = Scene(brdf.value, light.value, normalized, exposure, size, material)
     words = _words(scene, rules, targets or [])
     figures = {_file_name([start, *words]): value for start, value in surfaces.items()}
-    folder = check_folder(output)
+    folder = check_folder(context, output)
     outputs.check(*(folder / f"{name}.{kind}" for name in figures for kind in ("csv", "png")))
     rows: list[dict[str, Any]] = []
     for name, value in figures.items():

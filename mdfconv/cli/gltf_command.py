@@ -126,6 +126,7 @@ def command(
             "--guess proposes one",
         )
     _convert(
+        context,
         files,
         output,
         source,
@@ -142,6 +143,7 @@ def command(
 
 
 def _convert(
+    context: typer.Context,
     files: list[str],
     output: str | None,
     source: str,
@@ -169,6 +171,7 @@ def _convert(
         raise MdfconvError(f"--compare is about exponents, {ends[0].label} stores none")
 
     def convert(destination: Destination, data: bytes) -> GltfConversion:
+        _check_form(destination, data)
         folders = GltfTextures(destination.source.parent, destination.output.parent, lossy)
         chosen = folders if textures else None
         with about(destination.source):
@@ -177,6 +180,7 @@ def _convert(
         return dataclasses.replace(conversion, problems=tuple(problems))
 
     convert_files(
+        context,
         files,
         output,
         in_place=in_place,
@@ -185,6 +189,21 @@ def _convert(
         convert=convert,
         report=lambda converted: _report(converted, metric, names, form=form, compare=compare),
     )
+
+
+def _check_form(destination: Destination, data: bytes) -> None:
+    """Refuse a name that says of a file that it is of the other form, which it does not become."""
+    from mdfconv.scene.gltf_container import is_glb
+
+    form = ".glb" if is_glb(data) else ".gltf"
+    named = destination.output.suffix.lower()
+    renamed = destination.output.name != destination.source.name
+    if renamed and named in {".glb", ".gltf"} - {form}:
+        raise MdfconvError(
+            f"{destination.source} stays {form[1:]} in its form, {destination.output} says "
+            f"{named[1:]}",
+            f"name it {destination.output.with_suffix(form)}",
+        )
 
 
 def _with_option(problem: str) -> str:

@@ -69,7 +69,7 @@ def _list_encodings(metric: Metric, format_: Format | None) -> None:
     """Print the table of encodings and dialects."""
     from mdfconv.scene.encodings import EXPONENTS, encoding_records
 
-    form = form_of(format_, in_pipe=Format.plain)
+    form = form_of(format_)
     records = encoding_records(metric)
     if form is not Format.table:
         write_table(["encoding"] if form is Format.plain else list(records[0]), records, form)

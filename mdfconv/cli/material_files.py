@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
@@ -56,6 +57,7 @@ ReportFormatOption = Annotated[
 
 
 def convert_files(
+    context: typer.Context,
     patterns: Sequence[str],
     output: str | None,
     *,
@@ -69,6 +71,8 @@ def convert_files(
 
     Parameters
     ----------
+    context : typer.Context
+        Of the command.
     patterns : sequence of str
         Names and glob patterns.
     output : str or None
@@ -89,17 +93,19 @@ def convert_files(
     MdfconvError
         If a file cannot be read, converted at all, or written; nothing is then changed.
     """
-    from mdfconv.cli.outputs import Outputs
+    from mdfconv.cli.outputs import Outputs, new_folder
     from mdfconv.output.files import find_files, is_stream
-    from mdfconv.scene.material_files import choose_outputs, read_file, write_conversions
+    from mdfconv.scene import material_files
 
     files = find_files(patterns)
-    destinations = choose_outputs(files, output, in_place=in_place)
+    destinations = material_files.choose_outputs(files, output, in_place=in_place)
+    if output and material_files.is_folder(output):
+        new_folder(context, Path(output))
     results = [[] if each.backup else [each.output] for each in destinations]
     Outputs(*chain(*results), force=force, inputs=[*files, *metric.inputs])
     converted = []
     for destination, result in zip(destinations, results, strict=True):
-        data = read_file(destination.source)
+        data = material_files.read_file(destination.source)
         conversion = convert(destination, data)
         if conversion.files and is_stream(destination.output):
             raise MdfconvError(f"no texture can stand beside {destination.output}: it is no file")
@@ -107,7 +113,7 @@ def convert_files(
         inputs = *files, *metric.inputs, *conversion.inputs
         Outputs(*result, *conversion.files, force=force, inputs=inputs)
         converted.append((destination, data, conversion))
-    written = write_conversions(converted, force=force)
+    written = material_files.write_conversions(converted, force=force)
     report([(destination, conversion) for destination, _, conversion in converted])
     problems = False
     for destination, _, conversion in converted:
@@ -115,6 +121,7 @@ def convert_files(
             beside = [path for path in (destination.backup, *conversion.files) if path]
             for path in (destination.output, *beside):
                 tell(f"wrote {path}")
+            _tell_missing(destination, conversion)
         else:
             tell(f"nothing to change in {destination.output}")
         _tell_notes(destination.source, conversion.notes)
@@ -123,6 +130,23 @@ def convert_files(
             problems = True
     if problems:
         raise typer.Exit(1)
+
+
+def _tell_missing(destination: Destination, conversion: FileConversion) -> None:
+    """Say which files a result in another folder names and no longer finds."""
+    before, now = destination.source.parent, destination.output.parent
+    missing = [
+        name
+        for name in dict.fromkeys(conversion.named)
+        if os.path.isfile(before / name) and not os.path.isfile(now / name)
+    ]
+    if missing:
+        more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+        tell(
+            f"note: {destination.output} names {missing[0]}{more}, which "
+            f"{'is' if len(missing) == 1 else 'are'} found from {before} and not from {now}: "
+            "copy them, too, or write beside the original"
+        )
 
 
 def _tell_notes(source: Path, notes: Sequence[tuple[int, str]]) -> None:

@@ -36,6 +36,7 @@ _SECONDARY = ("from", "line")
 
 
 def command(
+    context: typer.Context,
     scenes: Annotated[
         list[str],
         typer.Argument(metavar="IN.xml...", help="Scenes, or patterns such as '*.xml'."),
@@ -103,6 +104,7 @@ def command(
             _print_report(record, len(each[1].materials))
 
     convert_files(
+        context,
         scenes,
         output,
         in_place=in_place,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -13,6 +14,7 @@ from mdfconv.cli.material_files import (
     ReportFormat,
     ReportFormatOption,
     ResultOption,
+    about,
     convert_files,
     material_rows,
     print_importers,
@@ -106,18 +108,21 @@ def command(
     kept = chosen_metric(metric, exposure)
 
     def convert(destination: Destination, data: bytes) -> MtlConversion:
-        if not textures:
-            return convert_mtl(data, wanted, metric=kept, replace=replace)
-        new = _convert_textures(destination, data, kept, exponent_max)
-        conversion = convert_mtl(
-            data, wanted, metric=kept, replace=replace, texture_names=new.names
-        )
+        new = _convert_textures(destination, data, kept, exponent_max) if textures else None
+        names = new.names if new else None
+        with about(destination.source):
+            conversion = convert_mtl(
+                data, wanted, metric=kept, replace=replace, texture_names=names
+            )
+        if new is None:
+            return dataclasses.replace(conversion, problems=_with_option(conversion.problems))
         problems = (*new.problems, *conversion.problems)
         return dataclasses.replace(
             conversion, files=new.files, inputs=new.inputs, problems=problems
         )
 
     convert_files(
+        context,
         libraries,
         output,
         in_place=in_place,
@@ -125,6 +130,14 @@ def command(
         metric=kept,
         convert=convert,
         report=lambda converted: _report(converted, kept, form=format_, compare=compare),
+    )
+
+
+def _with_option(problems: Sequence[tuple[int | str, str]]) -> tuple[tuple[int | str, str], ...]:
+    """Return what is left in a library, with the option that helps."""
+    return tuple(
+        (line, f"{text}: --textures converts it" if text.startswith("map_Ns") else text)
+        for line, text in problems
     )
 
 
@@ -169,7 +182,5 @@ def _report(
         return
     for record, exponents in zip(records, known, strict=True):
         print_materials(record, _HEADINGS, len(exponents))
-        for texture in record["textures"]:
-            typer.echo(f"{texture['keyword']} {texture['file']} (line {texture['line']})", err=True)
         if compare:
             print_importers(record, exponents)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,6 +10,9 @@ from typing import TypeAlias
 
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
+
+# As a pair this is no surface: one of its axes would be a mirror.
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?0,\d+\s*\Z")
 
 Number: TypeAlias = float | tuple[float, float]
 
@@ -96,6 +100,9 @@ def _number(text: str, where: str) -> Number:
         parts = [float(part) for part in text.split(",")]
     except ValueError:
         raise MdfconvError(f"{where}'{text}' is not a number", percent_hint(text)) from None
+    if _DECIMAL_COMMA.match(text):
+        hint = f"did you mean {text.strip().replace(',', '.')}?"
+        raise MdfconvError(f"{where}'{text}' is a pair whose first number is 0", hint)
     if len(parts) > 2:
         raise MdfconvError(f"{where}'{text}' is not a pair X,Y")
     return (parts[0], parts[1]) if len(parts) == 2 else parts[0]

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
+
+import typer
 
 from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
@@ -98,7 +100,25 @@ class Outputs:
             tell(f"wrote {path}")
 
 
-def check_folder(folder: Path | None) -> Path:
+def new_folder(context: typer.Context, folder: Path) -> None:
+    """Create a folder that is not there; at the end of a command that left it empty it goes.
+
+    Raises
+    ------
+    MdfconvError
+        If it cannot be created.
+    """
+    if not folder.is_dir():
+        create_folder(folder)
+        context.call_on_close(lambda: _remove_if_empty(folder))
+
+
+def _remove_if_empty(folder: Path) -> None:
+    with suppress(OSError):
+        folder.rmdir()
+
+
+def check_folder(context: typer.Context, folder: Path | None) -> Path:
     """Return the folder to write to, created if it is not there; without a choice ./reports.
 
     Raises
@@ -107,7 +127,7 @@ def check_folder(folder: Path | None) -> Path:
         If it is not a folder, or cannot be created or written to.
     """
     chosen = folder or _DEFAULT_FOLDER
-    create_folder(chosen)
+    new_folder(context, chosen)
     if not os.access(chosen, os.W_OK):
         raise MdfconvError(f"cannot write to {chosen}")
     return chosen

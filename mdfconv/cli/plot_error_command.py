@@ -94,7 +94,7 @@ def command(
     ends = [asked_endpoint(name) for name in mdf or ()]
     sets = _sets(m_b, method, asked, chief, ends)
     endings = [*[".png"] * png, *[".svg"] * svg, *["b.csv"] * csv]
-    folder = check_folder(output)
+    folder = check_folder(context, output)
     outputs = Outputs(*(folder / f"{name}{end}" for name in sets for end in endings), force=force)
     shown = given_metric(asked)
     figures = {name: curves(each, chief, shown, points) for name, each in sets.items()}

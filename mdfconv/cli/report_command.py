@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import typer
+
 from mdfconv.cli.options import FolderOption, ForceOption
 from mdfconv.cli.outputs import Outputs, check_folder
 from mdfconv.cli.tables import progress
 
 
 def command(
+    context: typer.Context,
     output: FolderOption = None,
     force: ForceOption = False,
 ) -> None:
@@ -21,7 +24,7 @@ def command(
     """
     from mdfconv.reports.build import COUNT, ELSEWHERE, FILES, build, report_files
 
-    folder = check_folder(output)
+    folder = check_folder(context, output)
     outputs = Outputs(*(folder / name for name in FILES), force=force)
     artefacts = []
     with progress("Report", COUNT) as advance:

@@ -290,7 +290,8 @@ def _encoding(owner: Distribution, name: str) -> Encoding | None:
             f"{owner.parameter.symbol} is given as it is"
         )
     if key not in known:
-        raise unknown_name(f"encoding of {owner.name}", name, known)
+        meant = [owner.meant_by[key]] if key in owner.meant_by else []
+        raise unknown_name(f"encoding of {owner.name}", name, known, meant)
     dialect = dialects_of(owner.name).get(key)
     if dialect:
         return dialect.encoding(owner.parameter, setting)

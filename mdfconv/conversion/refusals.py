@@ -76,7 +76,9 @@ def unreachable(
         why += f", which {target.label} cannot store" if storable else ""
         why += f", outside {target.stored.legal if storable else limits.legal}"
     answers = _answers(method, metric, value, source, target)
-    return MdfconvError(f"{start} {method.name} {why}", answers or "no method answers")
+    if not answers:
+        return MdfconvError(f"{start} {method.name} {why}", "no method answers")
+    return MdfconvError(f"{start} {method.name} {why}", answers, argument="method")
 
 
 def _answers(
@@ -84,12 +86,13 @@ def _answers(
 ) -> str:
     """Return what the other methods make of a value, in words."""
     pair = source.distribution, target.distribution
-    answers = []
+    answers: list[str] = []
     for method in list_methods():
         if method.name == refused.name or not method.covers(*pair, metric):
             continue
         with np.errstate(all="ignore"):
             stored = target.encode(method.convert(np.asarray([value]), *pair, metric))
         if target.stored.accepts(stored)[0]:
-            answers.append(f"{method.name} answers {number_text(float(stored[0]))}")
-    return " and ".join(answers)
+            verb = "" if answers else " answers"
+            answers.append(f"{method.name}{verb} {number_text(float(stored[0]))}")
+    return ", ".join(answers)

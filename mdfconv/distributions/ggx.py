@@ -55,6 +55,11 @@ class GGX(AnisotropicDistribution):
     encodings = (ROUGHNESS, GLOSSINESS)
     meant_by: ClassVar = {
         "roughness": "ggx:roughness",
+        "principled": "ggx:roughness",
+        "disney": "ggx:roughness",
+        "blender": "ggx:roughness",
+        "gltf": "ggx:roughness",
+        "pbr": "ggx:roughness",
         "perceptual-roughness": "ggx:roughness",
         "alpha": "ggx",
         "glossiness": "ggx:glossiness",

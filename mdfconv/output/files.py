@@ -42,7 +42,7 @@ def find_files(patterns: Sequence[str]) -> list[Path]:
     Raises
     ------
     MdfconvError
-        If one stands for nothing.
+        If one stands for nothing, or for a folder.
     """
     files: dict[Path, None] = {}
     for pattern in patterns:
@@ -50,6 +50,8 @@ def find_files(patterns: Sequence[str]) -> list[Path]:
         names = [pattern] if there else sorted(glob.glob(pattern, recursive=True))
         if not names:
             raise MdfconvError(f"cannot read {pattern}: No such file or directory")
+        for folder in filter(os.path.isdir, names):
+            raise MdfconvError(f"{folder} is a folder", f"name its files, as in '{folder}/*'")
         files |= dict.fromkeys(map(Path, names))
     return list(files)
 

@@ -133,6 +133,7 @@ def convert_gltf(
         problems=tuple((f"materials[{at}]", problems[at]) for at in sorted(problems)),
         files=changes.files,
         inputs=changes.inputs,
+        named=document.named_files,
     )
 
 

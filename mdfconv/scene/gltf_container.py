@@ -79,6 +79,11 @@ def _padding(size: int) -> int:
     return -size % _ALIGNMENT
 
 
+def is_glb(data: bytes) -> bool:
+    """Return whether a file is a GLB by its first bytes."""
+    return data.startswith(_MAGIC)
+
+
 def read_container(data: bytes) -> Container:
     """Return the pieces of a glTF file.
 
@@ -87,7 +92,7 @@ def read_container(data: bytes) -> Container:
     MdfconvError
         If it is a GLB that is incomplete or of another version.
     """
-    if not data.startswith(_MAGIC):
+    if not is_glb(data):
         return Container(data)
     if len(data) < _HEADER.size:
         raise MdfconvError(f"is a GLB of {len(data)} bytes, less than its header")

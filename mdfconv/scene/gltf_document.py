@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
+from urllib.parse import unquote
 
 from mdfconv.errors import MdfconvError
 from mdfconv.scene.json_edit import JsonText, Place, read_json
 
+_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 FACTOR = "roughnessFactor"
 TEXTURE = "metallicRoughnessTexture"
 PBR = "pbrMetallicRoughness"
+
+
+def is_address(uri: str) -> bool:
+    """Return whether a URI names no file beside the document: it has a scheme or a host."""
+    return uri.startswith("//") or bool(_SCHEME.match(uri))
 
 
 class GltfDocument:
@@ -44,6 +52,13 @@ class GltfDocument:
         """What wrote the file, in one line; "" if it does not say."""
         generator = self._asset.get("generator")
         return " ".join(generator.split()) if isinstance(generator, str) else ""
+
+    @property
+    def named_files(self) -> list[str]:
+        """The other files that it names: images and buffers."""
+        entries = [place.value for name in ("buffers", "images") for place in self.array(name)]
+        uris = [entry.get("uri") for entry in entries if isinstance(entry, dict)]
+        return [unquote(uri) for uri in uris if isinstance(uri, str) and not is_address(uri)]
 
     def array(self, name: str) -> list[Place]:
         """Return the elements of one of the file's arrays; none if it has no such array."""

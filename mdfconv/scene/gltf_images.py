@@ -14,11 +14,10 @@ from urllib.parse import quote, unquote
 
 from mdfconv.errors import MdfconvError
 from mdfconv.scene.gltf_container import Container, aligned
-from mdfconv.scene.gltf_document import GltfDocument
+from mdfconv.scene.gltf_document import GltfDocument, is_address
 from mdfconv.scene.json_edit import JsonText
 from mdfconv.scene.material_files import free_name, read_file
 
-_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 _DATA = re.compile(r"data:([^,]*),", re.IGNORECASE)
 _SIGNATURES = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg"}
 _UNSAFE = re.compile(r"[^\w.-]+")
@@ -196,7 +195,7 @@ class GltfImages:
         inside = _DATA.match(uri)
         if inside:
             return _decoded(uri[inside.end() :], inside[1])
-        if _SCHEME.match(uri) or uri.startswith("//"):
+        if is_address(uri):
             raise MdfconvError(f"names {uri}, which is no file beside it")
         path = self._folders.source / unquote(uri)
         if path not in self._read:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mdfconv.errors import MdfconvError
-from mdfconv.output.files import create_folder, write_files
+from mdfconv.output.files import write_files
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def choose_outputs(
     files : sequence of Path
         The files.
     output : str or None
-        A file for one of them, or a folder, which exists or is named with a slash at its end.
+        A file for one of them, or a folder, as `is_folder`.
     in_place : bool
         Write over the file itself and keep the original beside it.
 
@@ -49,23 +49,25 @@ def choose_outputs(
     """
     if in_place == (output is not None):
         raise MdfconvError(
-            "a file is converted in place, or into another file or folder",
+            "a file is converted into another file or folder (--output), or in place (--in-place)",
             "choose one of them",
-            argument="in_place",
         )
     if output is None:
         real = dict.fromkeys(file.resolve() for file in files)
         return [Destination(file, file, _free_backup(file)) for file in real]
     path = Path(output)
-    if output.endswith(("/", os.sep)):
-        create_folder(path)
-    if path.is_dir():
+    if is_folder(output):
         return [Destination(file, path / file.name) for file in files]
     if len(files) > 1:
         raise MdfconvError(f"{len(files)} files need a folder: {output} is not one")
     if output == "-":
         raise MdfconvError(f"cannot write {output}: it is not a file or an existing folder")
     return [Destination(files[0], path)]
+
+
+def is_folder(output: str) -> bool:
+    """Return whether a name is that of a folder: one that is there, or with a slash at its end."""
+    return output.endswith(("/", os.sep)) or Path(output).is_dir()
 
 
 def free_name(folder: Path, stem: str, suffix: str, taken: Container[Path]) -> Path:
@@ -103,6 +105,8 @@ class FileConversion:
         What goes beside the result, such as textures.
     inputs : sequence of Path
         The files that those were made from.
+    named : sequence of str
+        The other files that it names, by paths relative to it.
     """
 
     data: bytes
@@ -110,6 +114,7 @@ class FileConversion:
     notes: tuple[tuple[int, str], ...] = ()
     files: Mapping[Path, bytes] = field(default_factory=dict)
     inputs: Sequence[Path] = ()
+    named: Sequence[str] = ()
 
 
 def read_file(path: Path) -> bytes:

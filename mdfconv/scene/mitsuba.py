@@ -178,6 +178,7 @@ def _conversion(
         data=edits.result(),
         materials=tuple(materials),
         textures=tuple(textures.values()),
+        named=scene.named,
         includes=tuple(
             (scene.lines(each.start), each.attributes.get("filename", ""))
             for each in scene.includes

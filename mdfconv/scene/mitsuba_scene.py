@@ -113,6 +113,8 @@ class Scene:
         Those with a roughness, in order.
     includes : list of Element
         What stands in other files.
+    named : list of str
+        All files that it names.
     uses : Counter
         How often each default or texture is used, by its element.
     lines : Lines
@@ -123,6 +125,7 @@ class Scene:
     lines: Lines
     bsdfs: list[Bsdf] = field(default_factory=list)
     includes: list[Element] = field(default_factory=list)
+    named: list[str] = field(default_factory=list)
     uses: Counter[Element] = field(default_factory=Counter)
 
 
@@ -141,6 +144,9 @@ def read_scene(data: bytes) -> Scene:
     for element in elements:
         if element.tag == "include":
             scene.includes.append(element)
+            scene.named.append(element.attributes.get("filename", ""))
+        elif element.tag == "string" and element.attributes.get("name") == "filename":
+            scene.named.append(element.attributes.get("value", ""))
         elif element.tag == "bsdf":
             kind = element.attributes.get("type")
             if kind in _MICROFACET_TYPES:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -10,11 +11,12 @@ import numpy as np
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.material_files import FileConversion
-from mdfconv.scene.mtl_statements import Line, lines, number, split_options
+from mdfconv.scene.mtl_statements import Line, lines, named_files, number, split_options
 from mdfconv.scene.shininess import exponent_of, fit_error, roughness_of
 
 # Tools that write libraries end at 1000, some at 10000: more is likely of another scale.
 _LARGEST_USUAL = 1e4
+_MODEL = re.compile(rb"^[ \t]*mtllib[ \t]+([^\r\n]*)", re.MULTILINE)
 # Digits enough that an exponent comes back from a roughness to six.
 _DIGITS = {b"Pr": 8, b"Ns": 6}
 
@@ -120,7 +122,7 @@ def convert_mtl(
         Drop the statement that was converted.
     texture_names : dict, optional
         From files that ``map_Ns`` names to those that a ``map_Pr`` beside it is to name; for
-        shininess the other way round.
+        shininess the other way round. Without it such statements are problems.
 
     Returns
     -------
@@ -130,8 +132,12 @@ def convert_mtl(
     Raises
     ------
     MdfconvError
-        If `to` or the metric is not known.
+        If `to` or the metric is not known, or the file is a model that names a library.
     """
+    model = _MODEL.search(data)
+    if model:
+        library = model[1].decode(errors="replace")
+        raise MdfconvError("is a model, not a material library", f"its materials are in {library}")
     if to not in list(To):
         raise MdfconvError(f"a library is converted to roughness or shininess, not to '{to}'")
     keywords = (b"Ns", b"Pr") if to == To.roughness else (b"Pr", b"Ns")
@@ -140,6 +146,8 @@ def convert_mtl(
     materials = _converted(blocks, to, metric_named(metric))
     texts = _edited(content, blocks, materials, keywords, replace=replace)
     textures = _textures(content, blocks, b"map_" + keywords[0])
+    if texture_names is None:
+        problems += [(each.line, f"{each.keyword} {each.file} is a texture") for each in textures]
     names = texture_names or {}
     _set_textures(texts, content, textures, b"map_" + keywords[1], names, replace=replace)
     return MtlConversion(
@@ -147,6 +155,7 @@ def convert_mtl(
         notes=_replaced(content, texts, keywords[1]),
         materials=tuple(filter(None, materials)),
         textures=textures,
+        named=named_files(data),
         problems=tuple(problems),
     )
 

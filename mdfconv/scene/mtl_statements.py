@@ -15,6 +15,8 @@ _LINE = re.compile(rb"([^\r\n]*)(\r\n|\n|\r|\Z)")
 _START = re.compile(
     rb"((?:\xef\xbb\xbf)?[ \t]*)(newmtl|Ns|Pr|map_Ns|map_Pr)(?=[ \t#]|\Z)",
 )
+# In any case of letters, as readers take them.
+_TEXTURE = re.compile(rb"[ \t]*(?:map_\w+|bump|disp|decal|refl|norm)[ \t]+(.*)\Z", re.IGNORECASE)
 _NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\Z")
 _OPTION = re.compile(
     rb"-[A-Za-z]\w*(?:[ \t]+(?:[+-]?[\d.]\S*|on|off|[rgbmlz](?=[ \t])|\w+_\w+))+[ \t]+"
@@ -95,6 +97,13 @@ def number(text: bytes, keyword: bytes) -> tuple[str, float]:
     if not 0 <= value < np.inf or (keyword == b"Pr" and value > 1):
         return f"{shown} is outside {'0 ≤ Pr ≤ 1' if keyword == b'Pr' else 'Ns ≥ 0'}", np.nan
     return "", value
+
+
+def named_files(data: bytes) -> list[str]:
+    """Return the textures that a library names, in order."""
+    statements = (_TEXTURE.match(match[1]) for match in _LINE.finditer(data))
+    values = [match[1].partition(b"#")[0].rstrip(_BLANKS) for match in statements if match]
+    return [split_options(value)[1].decode(errors="replace") for value in values]
 
 
 def split_options(value: bytes) -> tuple[bytes, bytes]:

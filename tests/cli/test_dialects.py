@@ -1,5 +1,6 @@
 """Dialects on the command line."""
 
+import csv
 import json
 
 import pytest
@@ -44,7 +45,13 @@ def test_list():
     assert record["rmse_10"] > records["blinn-phong:peak"]["rmse_10"] > 0
     assert record["clamped"] == "r = 0 is any N ≥ 1000"
     assert records["ggx:pbrt-v3"]["rmse_10"] is None
-    assert run("list", "--encodings")[1].split()[:2] == [
+    # In a pipe, too, the rules: names alone are asked for.
+    assert next(csv.DictReader(run("list", "--encodings")[1].splitlines())) == {
+        **dict.fromkeys(next(iter(records.values())), ""),
+        **{"encoding": "beckmann:roughness", "formula": "α = r²", "range": "0 < r ≤ 1"},
+        "specular": "no",
+    }
+    assert run("list", "--encodings", "--format", "plain")[1].split()[:2] == [
         "beckmann:roughness",
         "beckmann:glossiness",
     ]

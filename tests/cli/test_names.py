@@ -51,6 +51,7 @@ WITHOUT_FORMS = {
 SLOW = {("bench", "--reference"), ("bench", "--from"), ("bench", "--to")}
 MEANT = {
     "roughness": "ggx:roughness",
+    "glTF": "ggx:roughness",
     "Perceptual_Roughness": "ggx:roughness",
     "glossiness": "ggx:glossiness",
     "shininess": "phong",  # blinn-phong, or the furnace's phong
@@ -196,6 +197,8 @@ def test_the_furnace_takes_a_stored_form():
 @pytest.mark.parametrize(
     ("words", "meant"),
     [
+        (("convert", "--from", "ggx", "--to", "gauss", "0,25"), "0.25"),
+        (("convert", "--from", "blinn-phong:exponent", "--to", "ggx", "20"), "blinn-phong"),
         (("convert", "--from", "ggx", "--to", "gtr", "--gamma", "200%", "0.2"), "2"),
         (("convert", "--from", "blinn-phong:vtk-gltf:50%", "--to", "ggx", "0.2"), "0.5"),
         (("convert", "--from", "ggx", "--to", "gauss", "--metric", "display:400%", "0.2"), "4"),
@@ -212,7 +215,7 @@ def test_the_furnace_takes_a_stored_form():
         (("bench", "--parameter", "20%"), "0.2"),
     ],
 )
-def test_percent_say_which_number_was_meant(words, meant, files):
+def test_a_number_says_which_was_meant(words, meant, files):
     status, out, err = run(*words, cwd=files)
     assert (status, out) == (2, "")
     assert f"did you mean {meant}?" in err.lower(), err

@@ -94,7 +94,7 @@ SCENE = '<scene version="3.0.0"><bsdf type="roughplastic"/></scene>'
 LOBE = "theta,v\n" + "".join(f"{t},{1 / (1 + t * t / 99)}\n" for t in range(60))
 WRITING = [
     "mtl a.mtl -o new/ --textures",
-    "mtl a.mtl --in-place",
+    "mtl a.mtl --in-place --textures",
     "gltf a.gltf -o new.gltf --from blinn-phong:obj2gltf --textures",
     "mitsuba a.xml -o new.xml",
     "texture x.png -o new.png --from blinn-phong:exponent --to ggx:roughness --png h.png",

@@ -277,17 +277,38 @@ def test_a_bad_statement_turns_the_status_to_1(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("to", "line", "words"),
+    [
+        ("roughness", "Ns 5\nmap_Ns x.png", ": --textures converts it"),
+        ("shininess", "Pr 1\nmap_Pr x.png", ""),
+    ],
+)
+def test_a_texture_that_is_left_turns_the_status_to_1(tmp_path, to, line, words):
+    (tmp_path / "a.mtl").write_text(f"newmtl a\n{line}\n")
+    status, _, err = run("mtl", "a.mtl", "-o", "b.mtl", "--to", to, cwd=tmp_path)
+    assert status == 1
+    statement = line.splitlines()[1]
+    assert f"a.mtl:3: {statement} is a texture{words}: left as it is" in err
+
+
+@pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["a.mtl"], "in place, or into another file or folder"),
-        (["a.mtl", "-o", "x.mtl", "--in-place"], "in place, or into another file or folder"),
+        (["a.mtl"], "into another file or folder (--output), or in place (--in-place)"),
+        (["a.mtl", "-o", "x.mtl", "--in-place"], "or in place (--in-place); choose one of them"),
         (["a.mtl", "-o", "a.mtl"], "a.mtl is the input"),
         (["a.mtl", "-o", "b.mtl"], "b.mtl exists; it can be replaced (--force)"),
         (["a.mtl", "b.mtl", "-o", "x.mtl"], "2 files need a folder"),
         (["a.mtl", "sub/a.mtl", "-o", "new"], "new/a.mtl is named for two results"),
         (["none.mtl", "-o", "x.mtl"], "cannot read none.mtl"),
         (["*.none", "-o", "x.mtl"], "cannot read *.none"),
-        (["sub", "-o", "x.mtl"], "cannot read sub: Is a directory"),
+        (["sub", "-o", "x.mtl"], "sub is a folder; name its files, as in 'sub/*'"),
+        ([".", "-o", "out/"], ". is a folder"),
+        (
+            ["a.obj", "-o", "out/"],
+            "a.obj: is a model, not a material library; its materials are in",
+        ),
+        (["a.mtl", "-o", "out/", "--to", "glossiness"], "not to 'glossiness'"),
         (["a.mtl", "-o", "none/x.mtl"], "cannot write none/x.mtl"),
         (["a.mtl", "-o", "none/none/"], "cannot create none/none"),
         (["a.mtl", "-o", "-"], "not a file or an existing folder"),
@@ -301,6 +322,7 @@ def test_mistakes(words, message, tmp_path):
     (tmp_path / "new").mkdir()
     for name in ("a.mtl", "b.mtl", "sub/a.mtl"):
         (tmp_path / name).write_bytes(SOURCE)
+    (tmp_path / "a.obj").write_text("# a model\n mtllib a.mtl\nv 0 0 0\n")
     before = sorted(tmp_path.rglob("*"))
     status, out, err = run("mtl", *words, cwd=tmp_path)
     assert (status, out) == (2, "")

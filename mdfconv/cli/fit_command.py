@@ -20,7 +20,6 @@ from mdfconv.cli.options import (
     ForceOption,
     Format,
     FormatOption,
-    GammaOption,
     OutputOption,
     PngOption,
     chosen_gamma,
@@ -171,7 +170,14 @@ def command(
     robust: Annotated[
         bool, typer.Option("--robust", help="Of two directions: let outliers count less.")
     ] = False,
-    gamma: GammaOption = None,
+    gamma: Annotated[
+        str | None,
+        typer.Option(
+            metavar="G",
+            help="Second parameter, of gtr and student-t, as a number that is kept; free, or not "
+            "given, it is fitted.",
+        ),
+    ] = None,
     tolerance: Annotated[
         float,
         typer.Option(metavar="T", help="How much worse than the best the simplest may be."),

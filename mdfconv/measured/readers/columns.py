@@ -36,6 +36,7 @@ _OUTGOING = {
 }  # fmt: skip
 _DIFFERENCE = {"delta", "relative", "rel", "diff", "difference"}
 _HALF = {"h", "half", "halfway"}
+_OF_HALF = _HALF | {"beta"}
 _UNITS = {"deg", "degree", "degrees", "rad", "radian", "radians", "cos", "cosine"}
 _FILLERS = {"of", "the", "direction", "dir", "vector", "normal", "w", "omega"}
 _JOINED = re.compile(r"(delta|d)?(theta|phi|zenith|azimuth)(\w*)")
@@ -70,6 +71,11 @@ def _side(incident: bool, outgoing: bool) -> Role | None:
     if incident == outgoing:
         return None
     return Role.theta_i if incident else Role.theta_o
+
+
+def is_half(name: str) -> bool:
+    """Return whether a name is one of the angle of half vectors."""
+    return bool(set(_words(name)) & _OF_HALF)
 
 
 def is_angle(name: str) -> bool:

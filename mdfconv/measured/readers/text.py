@@ -17,7 +17,7 @@ from mdfconv.measured.readers.choice import (
     told_unit,
     value_columns,
 )
-from mdfconv.measured.readers.columns import Role, is_angle, is_counting, is_value, role_of
+from mdfconv.measured.readers.columns import is_angle, is_counting, is_half, is_value
 from mdfconv.measured.readers.directions import directions
 from mdfconv.measured.readers.tables import Table, parse_table
 from mdfconv.measured.samples import UNITS, Samples, samples
@@ -64,9 +64,10 @@ def read_table(path: Path, table: Table, options: ReadOptions) -> Samples | Dire
     notes = (*table.notes, *about_angle, *about_values)
     if meaning in (REFLECTED, INCIDENT):
         return _along_the_normal(path, angle, unit, values, names, notes, meaning == INCIDENT)
-    said = role_of(table.names[column]) if table.is_named else None
-    if meaning == HALF or said in (Role.theta_i, Role.theta_o):
-        notes += (f"{listed(table, [column])} is read as the angle between normal and half vector",)
+    if not (table.is_named and is_half(table.names[column])):
+        other = "" if meaning else ", not of a direction (--angle-is)"
+        read = f"{listed(table, [column])} is read as the angle between normal and half vector"
+        notes += (read + other,)
     return samples(path, angle, unit, values, names, "ndf", notes)
 
 

@@ -69,7 +69,7 @@ class Registry(Generic[Item]):
                 raise MdfconvError(f"the {self.kind} '{word}' exists already")
         self._items[name] = item
         self._aliases |= dict.fromkeys((name, *aliases), name)
-        self._meant |= meant_by or {}
+        self._meant = dict(meant_by or {}) | self._meant
 
     def __getitem__(self, name: str) -> Item:
         """Return the item with a name or alias; raise `MdfconvError` if there is none."""

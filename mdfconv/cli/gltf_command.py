@@ -27,10 +27,14 @@ from mdfconv.cli.options import (
     chosen_metric,
     refuse_given,
 )
+from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from mdfconv.conversion.endpoint import Endpoint
     from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.gltf import GltfConversion
     from mdfconv.scene.material_files import Destination
@@ -176,6 +180,7 @@ def _convert(
         chosen = folders if textures else None
         with about(destination.source):
             conversion = convert_gltf(data, *ends, metric=metric, textures=chosen)
+        _tell_other_generator(destination.source, conversion.generator, ends[0])
         problems = [(place, _with_option(text)) for place, text in conversion.problems]
         return dataclasses.replace(conversion, problems=tuple(problems))
 
@@ -206,6 +211,29 @@ def _check_form(destination: Destination, data: bytes) -> None:
         )
 
 
+def _tell_other_generator(path: Path, generator: str, source: Endpoint) -> None:
+    """Say that a file names a program that stores another number than the user said."""
+    proposals = _proposals(generator)
+    asked = source.encoding.name.partition(":")[0] if source.encoding else ""
+    if proposals and asked not in proposals:
+        options = " or ".join(proposals.values())
+        tell(f"note: {path} was written by '{generator}', which stands for {options}")
+
+
+def _proposals(generator: str) -> dict[str, str]:
+    """Return the dialects that a generator lets expect, with the options that name them."""
+    from mdfconv.distributions.dialects import Specular
+    from mdfconv.scene.gltf import dialects_by_generator
+
+    proposals = {}
+    for dialect in dialects_by_generator(generator):
+        needed = " --specular L" if dialect.specular is Specular.needed else ""
+        provided = f" {dialect.provided}" if dialect.provided else ""
+        option = f"--from {dialect.owners[0]}:{dialect.name}{needed}{provided}"
+        proposals[dialect.name] = option
+    return proposals
+
+
 def _with_option(problem: str) -> str:
     """Return what is wrong with a material, with the option that helps."""
     from mdfconv.scene.gltf import HAS_TEXTURE
@@ -218,20 +246,15 @@ def _with_option(problem: str) -> str:
 
 def _propose(files: list[str]) -> None:
     """Print which source each file's generator lets expect."""
-    from mdfconv.distributions.dialects import Specular
     from mdfconv.output.files import find_files
-    from mdfconv.scene.gltf import dialects_by_generator, generator_of
+    from mdfconv.scene.gltf import generator_of
     from mdfconv.scene.material_files import read_file
 
     lines = []
     for path in find_files(files):
         with about(path):
             generator = generator_of(read_file(path))
-        proposals = []
-        for dialect in dialects_by_generator(generator):
-            needed = " --specular L" if dialect.specular is Specular.needed else ""
-            provided = f" {dialect.provided}" if dialect.provided else ""
-            proposals.append(f"--from {dialect.owners[0]}:{dialect.name}{needed}{provided}")
+        proposals = _proposals(generator).values()
         said = f"asset.generator is '{generator}'" if generator else "no asset.generator"
         lines.append(f"{path}: {said}: {' or '.join(proposals) or 'unknown'}")
     typer.echo("\n".join(lines))

@@ -97,6 +97,8 @@ def convert_files(
     from mdfconv.output.files import find_files, is_stream
     from mdfconv.scene import material_files
 
+    # A second name may be meant for the result.
+    material_files.check_place(output, in_place=in_place)
     files = find_files(patterns)
     destinations = material_files.choose_outputs(files, output, in_place=in_place)
     if output and material_files.is_folder(output):

@@ -61,7 +61,8 @@ def create_folder(folder: Path) -> None:
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
-        raise MdfconvError(f"cannot create {folder}: {error.strerror}") from None
+        reason = "it is a file" if folder.is_file() else error.strerror
+        raise MdfconvError(f"cannot create {folder}: {reason}") from None
 
 
 def exists_refusal(path: Path) -> MdfconvError:

@@ -68,9 +68,12 @@ class GltfConversion(FileConversion):
     ----------
     materials : tuple of GltfMaterial
         What was converted, in the order of the file.
+    generator : str
+        What wrote the file; "" if it does not say.
     """
 
     materials: tuple[GltfMaterial, ...]
+    generator: str
 
 
 def convert_gltf(
@@ -133,6 +136,7 @@ def convert_gltf(
         problems=tuple((f"materials[{at}]", problems[at]) for at in sorted(problems)),
         files=changes.files,
         inputs=changes.inputs,
+        generator=document.generator,
         named=document.named_files,
     )
 

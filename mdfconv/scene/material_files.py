@@ -47,11 +47,6 @@ def choose_outputs(
     MdfconvError
         If the results are to go nowhere or to two places.
     """
-    if in_place == (output is not None):
-        raise MdfconvError(
-            "a file is converted into another file or folder (--output), or in place (--in-place)",
-            "choose one of them",
-        )
     if output is None:
         real = dict.fromkeys(file.resolve() for file in files)
         return [Destination(file, file, _free_backup(file)) for file in real]
@@ -63,6 +58,15 @@ def choose_outputs(
     if output == "-":
         raise MdfconvError(f"cannot write {output}: it is not a file or an existing folder")
     return [Destination(files[0], path)]
+
+
+def check_place(output: str | None, *, in_place: bool) -> None:
+    """Raise `MdfconvError` if results are to go nowhere or to two places."""
+    if in_place == (output is not None):
+        raise MdfconvError(
+            "a file is converted into another file or folder (--output), or in place (--in-place)",
+            "choose one of them",
+        )
 
 
 def is_folder(output: str) -> bool:

@@ -311,7 +311,9 @@ def bitmap_file(texture: Element, version: int | None) -> Element:
     linear = _is_one(values.get("gamma", "")) and version in (0, None)
     if not (raw or linear or name.lower().endswith(".exr")):
         setting = 'gamma="1"' if version == 0 else 'raw="true"'
-        raise MdfconvError(f"Mitsuba takes {name} for sRGB, as it is without {setting}")
+        raise MdfconvError(
+            f"Mitsuba takes {name} for sRGB, as it is without {setting}: add that if it holds alpha"
+        )
     return file
 
 

@@ -132,7 +132,7 @@ def convert_mtl(
     Raises
     ------
     MdfconvError
-        If `to` or the metric is not known, or the file is a model that names a library.
+        If `to` or the metric is not known, or the file is no library: a model, or any other.
     """
     model = _MODEL.search(data)
     if model:
@@ -142,6 +142,8 @@ def convert_mtl(
         raise MdfconvError(f"a library is converted to roughness or shininess, not to '{to}'")
     keywords = (b"Ns", b"Pr") if to == To.roughness else (b"Pr", b"Ns")
     content = list(lines(data))
+    if not any(line.keyword for line in content) and any(map(_says_something, content)):
+        raise MdfconvError("is no material library: it has neither newmtl nor Ns nor Pr")
     blocks, problems = _blocks(content, keywords)
     materials = _converted(blocks, to, metric_named(metric))
     texts = _edited(content, blocks, materials, keywords, replace=replace)
@@ -158,6 +160,11 @@ def convert_mtl(
         named=named_files(data),
         problems=tuple(problems),
     )
+
+
+def _says_something(line: Line) -> bool:
+    """Return whether a line without a statement that matters is more than blank or a comment."""
+    return bool(line.before.partition(b"#")[0].strip())
 
 
 def texture_statements(data: bytes) -> tuple[TextureStatement, ...]:

@@ -117,7 +117,7 @@ def test_picture_and_permissions(quick):
         (("--parameter", "-1"), "m_B > 0"),
         (("--reference", "ggx", "--parameter", "2"), "0 < α ≤ 1"),
         (("--from", "ggx"), "nothing to convert"),
-        (("--to", "ggx:roughness"), "unknown distribution"),
+        (("--to", "ggx:roughness"), "here a distribution is meant"),
     ],
 )
 def test_mistakes_are_told_before_anything_is_measured(options, words, tmp_path):

@@ -105,7 +105,7 @@ def test_metric_and_encoding():
 
 
 def test_plain_in_a_pipe():
-    status, out, err = run("recommend", "--from", "phong", 100, "--tolerance", 1e-6)
+    status, out, err = run("recommend", "--from", "blinn-phong", 100, "--tolerance", 1e-6)
     assert (status, out) == (
         0, "shader blinn-phong 100 none\nnumpy blinn-phong 100 none\n",
     )  # fmt: skip

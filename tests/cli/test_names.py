@@ -150,6 +150,16 @@ def test_what_phong_is_taken_for_is_said(option, files):
     assert err.count("note: phong is taken for Blinn's exponent") == 1
 
 
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [("sun", "energy"), ("Sky", "environment"), ("sRGB", "display"), ("shape", "unit")],
+)
+def test_a_metric_is_known_by_what_it_keeps(word, meant):
+    status, out, err = run("convert", "--from", "ggx", "--to", "gauss", "--metric", word, "0.2")
+    assert (status, out) == (2, "")
+    assert err == f"mdfconv: unknown metric '{word}'; did you mean {meant}?\n"
+
+
 def records(*words, cwd):
     status, out, _ = run(*words, "--format", "csv", cwd=cwd)
     assert status == 0

@@ -12,7 +12,7 @@ from mdfconv.cli import app
 from tests.cli.runner import run, run_on_terminal
 from tests.light.maps import room, write_map
 
-LIBRARY = "newmtl a_material_with_a_long_name\nNs 1234.5678\nNs 100\nmap_Ns x.png\nnewmtl b\nNs 0\n"
+LIBRARY = "newmtl a_material_with_a_long_name\nNs 1234.5678\nNs 100\nnewmtl b\nNs 0\n"
 FACTORS = {
     "asset": {"version": "2.0"},
     "materials": [

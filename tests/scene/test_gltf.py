@@ -736,3 +736,25 @@ def test_texels_that_are_mirrors_are_told(tmp_path):
     data = text_of(textured(0, 0.5), textures=[{"source": 0}], images=images)
     found = convert_gltf(data, OBJ2GLTF, textures=GltfTextures(tmp_path, tmp_path))
     assert "8 of 8 texels are perfect mirrors" in found.materials[0].notes[1]
+
+
+@pytest.mark.parametrize(
+    ("generator", "told"),
+    [
+        ("obj2gltf", False),
+        ("Khronos glTF Blender I/O v4", True),
+        ("no such program", False),
+        (None, False),
+    ],
+)
+def test_another_program_than_was_said_is_told(generator, told, tmp_path):
+    asset = {"version": "2.0"} | ({"generator": generator} if generator else {})
+    material = {"pbrMetallicRoughness": {"roughnessFactor": 0.9}}
+    (tmp_path / "a.gltf").write_text(json.dumps({"asset": asset, "materials": [material]}))
+    status, _, err = run(
+        "gltf", "a.gltf", "-o", "b.gltf", "--from", "blinn-phong:obj2gltf", cwd=tmp_path
+    )
+    assert status == 0
+    assert err.count("note:") == told
+    note = f"note: a.gltf was written by '{generator}', which stands for --from blinn-phong:blender"
+    assert (note in err) == told

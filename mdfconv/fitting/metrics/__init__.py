@@ -27,7 +27,7 @@ def register_metric(kind: type[Metric]) -> None:
     MdfconvError
         If its name is taken.
     """
-    _REGISTRY.add(kind.name, kind)
+    _REGISTRY.add(kind.name, kind, meant_by=dict.fromkeys(kind.meant_by, kind.name))
 
 
 for _module in _MODULES:

@@ -30,6 +30,8 @@ class Metric(ABC):
         What a fit under the metric keeps, and what its signal S is, in words.
     word : str
         What it keeps, in one word.
+    meant_by : tuple of str
+        Words that are no names of metrics, by which users may mean this one.
     purpose : str
         Where that is right, in a few.
     normalized : bool
@@ -57,6 +59,7 @@ class Metric(ABC):
     normalized: ClassVar[bool]
     kinks: tuple[float, ...] = ()
     inputs: tuple[Path, ...] = ()
+    meant_by: ClassVar[tuple[str, ...]] = ()
     setting: ClassVar[str] = ""
     needs_setting: ClassVar[bool] = False
     over_angles: ClassVar[bool] = True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -35,6 +35,7 @@ class Display(Energy):
     keeps = "picture on a screen"
     word = "picture"
     purpose = "as seen on a screen"
+    meant_by: ClassVar[tuple[str, ...]] = ("screen", "picture", "srgb", "image")
     quantity = "normalized D as a screen shows it"
     setting = "exposure"
 

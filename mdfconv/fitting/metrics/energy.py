@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
@@ -15,6 +17,7 @@ class Energy(Metric):
     keeps = "light"
     word = "light"
     purpose = "sun or lamp, linear light"
+    meant_by: ClassVar[tuple[str, ...]] = ("sun", "lamp", "point", "directional", "peak")
     quantity = "normalized D / max D of the reference"
     normalized = True
 

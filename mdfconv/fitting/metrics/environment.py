@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import ClassVar
 
 import numpy as np
 
@@ -32,6 +33,7 @@ class Environment(Metric):
     keeps = "light of a natural environment"
     word = "environment"
     purpose = "natural light"
+    meant_by: ClassVar[tuple[str, ...]] = ("natural", "sky", "scene", "hdri", "ibl")
     quantity = "share of the facets within β, beyond a uniform lobe's"
     normalized = True
 

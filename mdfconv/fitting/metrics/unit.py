@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
@@ -15,6 +17,7 @@ class Unit(Metric):
     keeps = "shape of the lobe"
     word = "shape"
     purpose = "lobe's shape"
+    meant_by: ClassVar[tuple[str, ...]] = ("shape", "lobe", "paper")
     quantity = "unit form D / max D"
     normalized = False
 

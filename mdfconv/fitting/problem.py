@@ -190,8 +190,7 @@ class Problem:
             ends = [(mode, np.full_like(mode, 0.5 * np.pi))]
             if np.any(mode > 0):
                 ends.append((mode, np.zeros_like(mode)))
-            with np.errstate(all="ignore"):  # as a lobe far beyond any screen's resolution is
-                kinks += [level_crossing(distribution, parameter, level, *end) for end in ends]
+            kinks += [level_crossing(distribution, parameter, level, *end) for end in ends]
         return np.concatenate(kinks, axis=1) if kinks else None, distribution.edge(parameter)
 
 

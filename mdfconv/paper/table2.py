@@ -104,7 +104,7 @@ def paper_sweep() -> tuple[Array, Array]:
 
 def angle_limit(m_b: Array) -> Array:
     """Return the limit of β for any other m_B: 4 m_B, at most π/2."""
-    return np.minimum(_LIMIT * m_b, 0.5 * np.pi)
+    return _LIMIT * np.minimum(m_b, 0.5 * np.pi / _LIMIT)
 
 
 def fit_table(
@@ -141,7 +141,8 @@ def fit_table(
     rows: list[Row] = []
     for start in range(0, m_b.size, _BATCH):
         batch = slice(start, start + _BATCH)
-        columns = _columns(m_b[batch], limit[batch], metric, extended=extended)
+        with np.errstate(all="ignore"):  # what overflows has no best fit
+            columns = _columns(m_b[batch], limit[batch], metric, extended=extended)
         rows += [
             dict(zip(columns, row, strict=True))
             for row in np.stack([*columns.values()], 1).tolist()
@@ -165,11 +166,10 @@ def _read(name: str) -> list[dict[str, str]]:
 
 def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dict[str, Array]:
     """Return the columns of the table, in order."""
-    source = distribution(_SOURCE)
-    with np.errstate(all="ignore"):
-        n_eq11 = 2 / np.square(m_b)
+    source, n_eq11 = distribution(_SOURCE), 2 / np.square(m_b)
     # An exponent that is none has no error either.
-    _check_answers(m_b, np.where(np.isfinite(n_eq11), n_eq11, np.nan), FITTED["n"])
+    legal = distribution(FITTED["n"]).parameter.accepts(n_eq11)
+    _check_answers(m_b, np.where(legal, n_eq11, np.nan), FITTED["n"])
     protocol = metric.name == Unit.name
     samples = UniformSamples(limit, SAMPLES) if protocol else None
     by_eq11 = source, m_b, distribution(FITTED["n"])

@@ -7,7 +7,7 @@ import pytest
 
 import mdfconv
 from mdfconv.fitting.metrics import metric_named
-from mdfconv.paper.table2 import fit_table
+from mdfconv.paper.table2 import angle_limit, fit_table
 
 TURNED = r"outside the paper's sweep: .* m_B from 0.0044 to 0.4473; beyond 0.845 .* turns around"
 
@@ -78,6 +78,10 @@ def test_a_result_that_float16_rounds_to_none_is_refused(source, target):
         lambda: mdfconv.convert(5e-324, "blinn-phong:peak", "ggx", "closed-form"),
         lambda: mdfconv.convert(1e300, "smoothie", "blinn-phong:ifcopenshell-gltf", "fast"),
         lambda: mdfconv.convert((1e200, 0.1), "beckmann", "beckmann:pbrt-v4", metric="energy"),
+        lambda: fit_table(
+            np.array([1e100]), angle_limit(np.array([1e100])), metric_named("display")
+        ),
+        lambda: fit_table(np.array([1e308]), angle_limit(np.array([1e308])), metric_named("unit")),
         lambda: fit_table(np.array([1e-200]), np.array([1e-200]), metric_named("environment")),
         lambda: fit_table(
             np.array([1e-150]), np.array([1e-150]), metric_named("display"), extended=True

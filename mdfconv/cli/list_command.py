@@ -14,7 +14,7 @@ from mdfconv.cli.options import (
     OptionalMetricOption,
     asked_metric,
 )
-from mdfconv.cli.tables import form_of, print_table, write_table
+from mdfconv.cli.tables import console, form_of, print_table, write_table
 from mdfconv.distributions import Distribution, list_distributions
 from mdfconv.distributions.dialects import dialects_of
 from mdfconv.distributions.parameter import Parameter
@@ -25,6 +25,10 @@ from mdfconv.fitting.metrics import Metric, metric_named
 _NATURAL = "environment"
 # Of the table of encodings what a narrow terminal leaves out first.
 _SECONDARY = ("N 100", "programs", "N 10", "N 1000")
+_FOOTNOTE = (
+    "L is the weight of the specular lobe, which --specular gives, too. A mirror is what a rule "
+    "makes of a surface that is none."
+)
 
 
 def command(
@@ -85,6 +89,7 @@ def _list_encodings(metric: Metric, format_: Format | None) -> None:
     ]
     title = f"Encodings, and the RMSE of their rules under {metric}"
     print_table(list(rows[0]), rows, title, secondary=_SECONDARY)
+    console().print(_FOOTNOTE)
 
 
 def _error(rmse: float | None) -> float | str | None:

@@ -83,13 +83,14 @@ class TextureReport:
     remark: str = ""
 
     def notes(self, *, ends: bool = True) -> list[str]:
-        """Return what the user must know; `ends` includes mirrors and uniform lobes."""
+        """Return what the user must know; `ends` includes mirrors and the roughest."""
+        source, target = self.source, self.target
         texts = {
-            Outcome.MIRROR: f"perfect mirrors in {self.source}, and the smoothest {self.target}",
-            Outcome.UNIFORM: f"uniform lobes in {self.source}, and the roughest {self.target}",
+            Outcome.MIRROR: f"perfect mirrors in {source}: they get the smoothest {target}",
+            Outcome.UNIFORM: f"as rough as can be in {source}: they get the roughest {target}",
             Outcome.UNANSWERED: "without an answer by the method, clamped to the nearest",
-            Outcome.CLAMPED: f"clamped: their results are outside 0..1 in {self.target}",
-            Outcome.OUTSIDE: f"clamped: they are outside 0..1 in {self.source}",
+            Outcome.CLAMPED: f"clamped: their results are outside 0..1 in {target}",
+            Outcome.OUTSIDE: f"clamped: they are outside 0..1 in {source}",
             Outcome.NAN: "NaN, and left so",
         }
         if not ends:

@@ -26,7 +26,7 @@ def test_converts_and_counts(texture):
     status, out, err = run(*arguments(texture), *options)
     assert (status, out) == (0, "")
     lines = err.splitlines()
-    assert lines[0].startswith("mdfconv: note: 8 of 2048 texels are uniform lobes")
+    assert lines[0].startswith("mdfconv: note: 8 of 2048 texels are as rough as can be")
     places = texture.parent / "rough.png", histogram
     kept = ": ggx:roughness, keeps the light"
     assert lines[1:] == [f"mdfconv: wrote {places[0]}{kept}", f"mdfconv: wrote {places[1]}"]

@@ -62,14 +62,14 @@ def texels(incomplete: str) -> list[str]:
     return [*endpoints(incomplete), *stored]
 
 
-def library_targets() -> list[str]:
+def mtl_targets() -> list[str]:
     """Return what a material library is converted to."""
     from mdfconv.scene.mtl import To
 
     return list(To)
 
 
-def scene_targets() -> list[str]:
+def mitsuba_targets() -> list[str]:
     """Return the distributions to which a scene is converted."""
     from mdfconv.scene.mitsuba_scene import TARGETS
 

@@ -46,7 +46,7 @@ def command(
         str,
         typer.Option(
             metavar="MDF",
-            autocompletion=completion.scene_targets,
+            autocompletion=completion.mitsuba_targets,
             help="Distribution to convert to: ggx or beckmann.",
         ),
     ] = "ggx",

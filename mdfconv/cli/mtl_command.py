@@ -55,7 +55,7 @@ def command(
         str,
         typer.Option(
             metavar="WHAT",
-            autocompletion=completion.library_targets,
+            autocompletion=completion.mtl_targets,
             help="roughness (Pr from Ns) or shininess (Ns from Pr, the inverse).",
         ),
     ] = "roughness",

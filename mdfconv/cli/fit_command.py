@@ -247,10 +247,9 @@ def command(
     if report:
         contents |= _report(analyses[0], report, ends, separate=separate, logarithms=logarithms)
     title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
-    # By what fits are ranked stands before what they are not.
-    chief = [*_CHIEF, "log_rmse"] if logarithms and "log_rmse" in names else [*_CHIEF]
-    minor = [*_SECOND, *(name for name in names if name not in (*chief, *_SECOND))]
-    minor += ["rmse"] * (len(chief) > len(_CHIEF))
+    ranked = "log_rmse" if logarithms and "log_rmse" in names else "rmse"
+    minor = [*_SECOND, *(name for name in names if name not in _CHIEF + _SECOND), "rmse"]
+    minor.remove(ranked)
     write_table(names, rows, form, outputs, beside=contents, title=title, secondary=minor)
     for analysis in analyses:
         _tell(analysis, tolerance, named=len(analyses) > 1)

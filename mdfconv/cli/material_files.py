@@ -100,7 +100,7 @@ def convert_files(
     # A second name may be meant for the result.
     material_files.check_place(output, in_place=in_place)
     files = find_files(patterns)
-    destinations = material_files.choose_outputs(files, output, in_place=in_place)
+    destinations = material_files.choose_outputs(files, output)
     if output and material_files.is_folder(output):
         new_folder(context, Path(output))
     results = [[] if each.backup else [each.output] for each in destinations]

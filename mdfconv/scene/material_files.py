@@ -28,9 +28,7 @@ class Destination:
     backup: Path | None = None
 
 
-def choose_outputs(
-    files: Sequence[Path], output: str | None, *, in_place: bool
-) -> list[Destination]:
+def choose_outputs(files: Sequence[Path], output: str | None) -> list[Destination]:
     """Return where each file's conversion goes.
 
     Parameters
@@ -38,14 +36,13 @@ def choose_outputs(
     files : sequence of Path
         The files.
     output : str or None
-        A file for one of them, or a folder, as `is_folder`.
-    in_place : bool
-        Write over the file itself and keep the original beside it.
+        A file for one of them, or a folder, as `is_folder`; None to write over the file itself
+        and keep the original beside it.
 
     Raises
     ------
     MdfconvError
-        If the results are to go nowhere or to two places.
+        If several files have no folder to go to, or one is to go to standard output.
     """
     if output is None:
         real = dict.fromkeys(file.resolve() for file in files)

@@ -157,7 +157,7 @@ def convert_mtl(
         notes=_replaced(content, texts, keywords[1]),
         materials=tuple(filter(None, materials)),
         textures=textures,
-        named=named_files(data),
+        named=named_files(content),
         problems=tuple(problems),
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -99,9 +99,9 @@ def number(text: bytes, keyword: bytes) -> tuple[str, float]:
     return "", value
 
 
-def named_files(data: bytes) -> list[str]:
+def named_files(content: Iterable[Line]) -> list[str]:
     """Return the textures that a library names, in order."""
-    statements = (_TEXTURE.match(match[1]) for match in _LINE.finditer(data))
+    statements = (_TEXTURE.match(line.content) for line in content)
     values = [match[1].partition(b"#")[0].rstrip(_BLANKS) for match in statements if match]
     return [split_options(value)[1].decode(errors="replace") for value in values]
 

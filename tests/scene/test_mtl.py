@@ -243,7 +243,7 @@ def test_in_place_twice_at_once_loses_nothing(tmp_path, monkeypatch):
     """The second finds the library changed, or its name for the backup taken."""
     library = tmp_path / "a.mtl"
     library.write_bytes(SOURCE)
-    both = [choose_outputs([library], None, in_place=True)[0] for _ in range(2)]
+    both = [choose_outputs([library], None)[0] for _ in range(2)]
     conversion = convert_mtl(SOURCE)
     write_conversions([(both[0], SOURCE, conversion)])
     with pytest.raises(mdfconv.MdfconvError, match="it has changed since it was read"):

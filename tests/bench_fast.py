@@ -17,8 +17,8 @@ import numpy as np
 
 import mdfconv
 from mdfconv.distributions import distribution, one_parameter_distributions
-from mdfconv.fitting.fit import fit
 from mdfconv.fitting.metrics import list_metrics, metric_named
+from mdfconv.fitting.solve import fit
 
 NAMES = [entry.name for entry in one_parameter_distributions() if entry.map_variables]
 LIMIT = {"unit": 1e-6, "energy": 1e-6, "display": 1e-5, "environment": 1e-6}

@@ -13,12 +13,12 @@ import numpy as np
 from scipy.optimize import curve_fit
 
 import mdfconv
-from mdfconv.fitting.fit import fit
-from mdfconv.fitting.metrics.unit import Unit
+from mdfconv.fitting.metrics.base import Unit
 from mdfconv.fitting.quadrature import UniformSamples
+from mdfconv.fitting.solve import fit
 from mdfconv.measured.lobe_fit import fit_lobe
 from mdfconv.measured.readers.merl import read_merl
-from mdfconv.paper.table2 import FITTED, SAMPLES, paper_sweep
+from mdfconv.studies.table2 import FITTED, SAMPLES, paper_sweep
 
 REPEATS = 15
 

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 
 import mdfconv
-from mdfconv.conversion.endpoint import encodings_of
+from mdfconv.distributions.endpoint import encodings_of
 from mdfconv.fitting.metrics import list_metrics
 
 HARD = [

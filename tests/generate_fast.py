@@ -16,9 +16,9 @@ import mdfconv
 from mdfconv.distributions import one_parameter_distributions
 from mdfconv.distributions.equivalence import exact_route, to_root
 from mdfconv.fitting import maps
-from mdfconv.fitting.fit import FitCurve, cold_fit
 from mdfconv.fitting.map_making import MapMaker, Piece
 from mdfconv.fitting.metrics import list_metrics, metric_named
+from mdfconv.fitting.solve import FitCurve, cold_fit
 
 # A distribution that is another one in another parameter is a target of its own: near a uniform
 # lobe its parameter resolves more.

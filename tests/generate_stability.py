@@ -14,7 +14,7 @@ import numpy as np
 from mdfconv.distributions import distribution, one_parameter_distributions
 from tests import oracles, stability_fits
 
-DATA = Path(__file__).parents[1] / "mdfconv" / "benchmark" / "data"
+DATA = Path(__file__).parents[1] / "mdfconv" / "studies" / "data"
 # Significant digits that keep a reference far below the rounding of each type.
 DIGITS = {np.float64: 19, np.float32: 10, np.float16: 7}
 # Below the smallest subnormal number: no type can tell it from 0.

@@ -6,11 +6,10 @@ Not part of the package: `tests.test_registration` copies this file to a folder 
 import numpy as np
 
 from mdfconv.distributions import register
-from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.declarations import Printed
+from mdfconv.distributions.base import Distribution, Printed
 from mdfconv.distributions.parameter import Parameter
 from mdfconv.fitting.metrics import register_metric
-from mdfconv.fitting.metrics.energy import Energy
+from mdfconv.fitting.metrics.base import Energy
 
 
 def printed(beta, scale):

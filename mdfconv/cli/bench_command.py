@@ -16,9 +16,9 @@ from mdfconv.output.files import file_bytes
 from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
-    from mdfconv.benchmark.measure import Measurements, Task
-    from mdfconv.conversion.endpoint import Endpoint
+    from mdfconv.distributions.endpoint import Endpoint
     from mdfconv.distributions.evaluation import Array
+    from mdfconv.studies.bench.measure import Measurements, Task
 
 # The paper's reference, and its common rough and smooth surface.
 _REFERENCE, _PARAMETERS = "beckmann", (0.2, 0.05)
@@ -91,7 +91,7 @@ def command(
 
     mdfconv bench --format markdown --png speed-error.png > speed-error.md
     """
-    from mdfconv.benchmark.measure import measure
+    from mdfconv.studies.bench.measure import measure
 
     outputs = Outputs(csv, json, png, force=force)
     task = _task(reference, parameter, source, target, quick=quick)
@@ -103,7 +103,7 @@ def command(
     if json:
         contents[json] = file_bytes(_json(measurements))
     if png:
-        from mdfconv.benchmark.figure import draw
+        from mdfconv.studies.bench.figure import draw
 
         contents[png] = draw(measurements)
     outputs.write(contents)
@@ -113,9 +113,9 @@ def command(
 def _task(
     reference: str, parameter: list[float] | None, source: str, target: str, *, quick: bool
 ) -> Task:
-    from mdfconv.benchmark.measure import Task
-    from mdfconv.benchmark.timing import FULL, QUICK
     from mdfconv.distributions import one_parameter_distribution, one_parameter_distributions
+    from mdfconv.studies.bench.measure import Task
+    from mdfconv.timing import FULL, QUICK
 
     end = asked_endpoint(reference)
     return Task(
@@ -148,7 +148,7 @@ def _default_lobes(name: str) -> Array:
 
 
 def _print(measurements: Measurements, form: Format, png: Path | None) -> None:
-    from mdfconv.benchmark import page
+    from mdfconv.studies.bench import page
 
     if form is Format.csv:
         typer.echo(_csv(measurements))
@@ -172,7 +172,7 @@ def _csv(measurements: Measurements) -> str:
 
 
 def _json(measurements: Measurements) -> str:
-    from mdfconv.benchmark.page import sentences
+    from mdfconv.studies.bench.page import sentences
 
     content: dict[str, Any] = {"machine": measurements.machine, "sizes": vars(measurements.sizes)}
     return json_text(content | measurements.records() | {"verdicts": sentences(measurements)})

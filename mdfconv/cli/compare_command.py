@@ -25,15 +25,16 @@ from mdfconv.cli.options import (
     refuse_idle_metric,
 )
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
-from mdfconv.cli.tables import form_of, tell, write_table
+from mdfconv.cli.process import tell
+from mdfconv.cli.tables import form_of, write_table
 from mdfconv.errors import MdfconvError
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text
 from mdfconv.registry import ALL
 
 if TYPE_CHECKING:
-    from mdfconv.conversion.endpoint import Endpoint
-    from mdfconv.render.comparison import Rule, Scene
+    from mdfconv.distributions.endpoint import Endpoint
+    from mdfconv.render.comparison import ConversionRule, Scene
 
 _COLUMNS = (
     "figure", "conversion", "distribution", "parameter", "rmse_linear", "psnr_linear",
@@ -47,7 +48,7 @@ _REFERENCE = "beckmann"
 _ON_PAGE = "ggx"
 
 
-class Light(StrEnum):
+class LightName(StrEnum):
     """The lights of the scene."""
 
     directional = "directional"
@@ -98,8 +99,8 @@ def command(
             help="Exposure: 1 displays the source's peak, or its brightest channel, as white.",
         ),
     ] = 1.0,
-    light: Annotated[Light, typer.Option(help="A directional light or a square one.")] = (
-        Light.directional
+    light: Annotated[LightName, typer.Option(help="A directional light or a square one.")] = (
+        LightName.directional
     ),
     brdf: Annotated[
         Brdf, typer.Option(help="The BRDF into which the distribution is put.")
@@ -196,7 +197,7 @@ def command(
     write_table(_COLUMNS, _shown(rows, ends, form), form, title=_title(end, figures.values()))
 
 
-def _words(scene: Scene, rules: Sequence[Rule], targets: Sequence[str]) -> list[str]:
+def _words(scene: Scene, rules: Sequence[ConversionRule], targets: Sequence[str]) -> list[str]:
     """Return words for names of files: for all that is not as usual but the number of pixels."""
     from mdfconv.conversion import method_named
     from mdfconv.render.comparison import Scene, default_rules
@@ -231,9 +232,9 @@ def _takes_every(targets: list[str] | None) -> bool:
 
 def _targets(source: Endpoint, names: list[str]) -> list[Endpoint]:
     """Return what takes the source's place: what is named, or the paper's other distributions."""
-    from mdfconv.conversion.endpoint import one_parameter_endpoint
     from mdfconv.distributions import one_parameter_distributions
-    from mdfconv.paper.error_curves import PAPER_SETS
+    from mdfconv.distributions.endpoint import one_parameter_endpoint
+    from mdfconv.studies.error_curves import PAPER_SETS
 
     if names and not _takes_every(names):
         ends = [asked_endpoint(name) for name in names]
@@ -245,7 +246,7 @@ def _targets(source: Endpoint, names: list[str]) -> list[Endpoint]:
 
 
 def _answering(
-    values: Iterable[float], rules: Sequence[Rule], source: Endpoint, ends: list[Endpoint]
+    values: Iterable[float], rules: Sequence[ConversionRule], source: Endpoint, ends: list[Endpoint]
 ) -> list[Endpoint]:
     """Return the targets to which all values can be converted; say why the others are left out."""
     from mdfconv.conversion import convert
@@ -295,14 +296,14 @@ def _on_page(ends: list[Endpoint]) -> Endpoint:
     return next((end for end in ends if end.label == _ON_PAGE), ends[0])
 
 
-def _rules(method: str | None, metric: str | None, exposure: float) -> list[Rule]:
+def _rules(method: str | None, metric: str | None, exposure: float) -> list[ConversionRule]:
     from mdfconv.conversion import method_named
     from mdfconv.fitting.metrics import metric_named
-    from mdfconv.render.comparison import Rule, default_rules
+    from mdfconv.render.comparison import ConversionRule, default_rules
 
     if method is None and metric is None:
         return default_rules(exposure)
     kept = metric_named(metric or "unit")
     # A screen's picture is exposed as the scene is.
     kept = chosen_metric(kept.name, exposure) if kept.setting == "exposure" else kept
-    return [Rule(method_named(method or "fit").name, kept)]
+    return [ConversionRule(method_named(method or "fit").name, kept)]

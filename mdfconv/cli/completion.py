@@ -26,8 +26,8 @@ def distributions() -> list[str]:
 
 def endpoints(incomplete: str) -> list[str]:
     """Return the names of the distributions; once a colon is typed, those of the encodings."""
-    from mdfconv.conversion.endpoint import encodings_of
     from mdfconv.distributions import list_distributions
+    from mdfconv.distributions.endpoint import encodings_of
 
     known = {mdf.name: mdf for mdf in list_distributions()}
     if incomplete in known and encodings_of(known[incomplete]):
@@ -36,8 +36,8 @@ def endpoints(incomplete: str) -> list[str]:
 
 
 def _encoded(name: str) -> list[str]:
-    from mdfconv.conversion.endpoint import encodings_of
     from mdfconv.distributions import distribution
+    from mdfconv.distributions.endpoint import encodings_of
     from mdfconv.errors import MdfconvError
 
     try:
@@ -64,14 +64,14 @@ def texels(incomplete: str) -> list[str]:
 
 def mtl_targets() -> list[str]:
     """Return what a material library is converted to."""
-    from mdfconv.scene.mtl import To
+    from mdfconv.scene.mtl.library import To
 
     return list(To)
 
 
 def mitsuba_targets() -> list[str]:
     """Return the distributions to which a scene is converted."""
-    from mdfconv.scene.mitsuba_scene import TARGETS
+    from mdfconv.scene.mitsuba.scene import TARGETS
 
     return list(TARGETS)
 
@@ -99,7 +99,7 @@ def languages() -> list[str]:
 
 def furnace_brdfs(incomplete: str) -> list[str]:
     """Return the BRDFs that the furnace takes; once a colon is typed, the forms of a parameter."""
-    from mdfconv.brdf.models import list_models, model_distribution
+    from mdfconv.studies.furnace import list_models, model_distribution
 
     brdf, colon, _ = incomplete.partition(_COLON)
     if not colon:
@@ -124,21 +124,21 @@ def angle_units() -> list[str]:
 
 def normalizers() -> list[str]:
     """Return the normalizers of modified Phong."""
-    from mdfconv.brdf.phong import NORMALIZERS
+    from mdfconv.brdf.reflection import NORMALIZERS
 
     return NORMALIZERS.names
 
 
 def maskings() -> list[str]:
     """Return the masking functions."""
-    from mdfconv.brdf.masking import MASKINGS
+    from mdfconv.brdf.microfacet import MASKINGS
 
     return MASKINGS.names
 
 
 def materials() -> list[str]:
     """Return the materials that are known by name."""
-    from mdfconv.brdf.materials import list_materials
+    from mdfconv.brdf.fresnel import list_materials
 
     return list_materials()
 

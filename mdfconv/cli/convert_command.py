@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from mdfconv.cli.numbers import Block, read_blocks
+from mdfconv.cli.numbers import NumberBlock, read_blocks
 from mdfconv.cli.options import (
     ExposureOption,
     Format,
@@ -25,20 +25,20 @@ from mdfconv.cli.options import (
     chosen_gamma,
     every_metric,
 )
+from mdfconv.cli.process import tell
 from mdfconv.cli.tables import (
     ROWS_SHOWN,
     console,
     form_of,
     print_table,
     table_text,
-    tell,
     value_text,
 )
 from mdfconv.conversion import Conversion, explain, list_methods
 from mdfconv.conversion.arrays import FREE, Gamma
-from mdfconv.conversion.endpoint import endpoint, with_specular
 from mdfconv.conversion.explanation import results_and_cautions
 from mdfconv.distributions import list_distributions, one_parameter_distributions
+from mdfconv.distributions.endpoint import endpoint, with_specular
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
@@ -92,7 +92,7 @@ def command(
     seq 0.1 0.1 0.4 | mdfconv convert --from ggx --to beckmann --method half-angle -
     """
     form = form_of(format_, in_pipe=Format.plain)
-    rule = _Rule(method, asked_metric(metric, exposure), exposure, chosen_gamma(gamma))
+    rule = _ValueRule(method, asked_metric(metric, exposure), exposure, chosen_gamma(gamma))
     every = target.strip().lower() == _EVERY
     source, target = with_specular(source, source if every else target, specular)
     if form is Format.plain and not every and rule.gamma != FREE:
@@ -116,7 +116,7 @@ def command(
 
 
 @dataclass(frozen=True)
-class _Rule:
+class _ValueRule:
     """How to convert: the options of the command that all targets share."""
 
     method: str | None
@@ -128,7 +128,9 @@ class _Rule:
         options: dict[str, Any] = {"metric": self.metric, "gamma": self.gamma, "errors": errors}
         return explain(values, source, target, self.method, **options)
 
-    def results(self, block: Block, source: str, target: str) -> tuple[list[str], Sequence[str]]:
+    def results(
+        self, block: NumberBlock, source: str, target: str
+    ) -> tuple[list[str], Sequence[str]]:
         """Return the results of a block as text, and what they call for."""
         if block.has_pairs:
             found = self.explain(block.numbers, source, target, errors=False)
@@ -139,13 +141,13 @@ class _Rule:
         stored, cautions = results_and_cautions(numbers, source, target, self.method, **options)
         return list(map(number_text, stored.tolist())), cautions
 
-    def others(self, chosen: Conversion) -> Iterator[_Rule]:
+    def others(self, chosen: Conversion) -> Iterator[_ValueRule]:
         """Yield the other methods under the metric of an answer."""
         for method in list_methods():
             if method.name != chosen.method and (self.gamma != FREE or method.name == "fit"):
                 yield replace(self, method=method.name, metric=metric_named(chosen.metric))
 
-    def under_other_metrics(self, chosen: Conversion) -> Iterator[_Rule]:
+    def under_other_metrics(self, chosen: Conversion) -> Iterator[_ValueRule]:
         """Yield the fits under the other metrics."""
         for metric in every_metric(self.exposure):
             if str(metric) != chosen.metric:
@@ -162,7 +164,7 @@ def _targets(numbers: list[Any], source: str) -> list[str]:
 
 
 def _convert(
-    numbers: list[Any], source: str, targets: list[str], rule: _Rule, *, errors: bool
+    numbers: list[Any], source: str, targets: list[str], rule: _ValueRule, *, errors: bool
 ) -> tuple[list[list[Conversion]], list[MdfconvError]]:
     """Return the conversions to each target, and why a target has none."""
     conversions, refusals = [], []
@@ -177,16 +179,16 @@ def _convert(
     return conversions, refusals
 
 
-def _takes_gamma(source: str, target: str, rule: _Rule) -> bool:
+def _takes_gamma(source: str, target: str, rule: _ValueRule) -> bool:
     """Return whether a γ means something for one of many targets."""
     names = [target] if rule.gamma == FREE else [source, target]
     return any(endpoint(name).distribution.second_parameter for name in names)
 
 
-def _stream(blocks: Iterator[Block], source: str, target: str, rule: _Rule) -> None:
+def _stream(blocks: Iterator[NumberBlock], source: str, target: str, rule: _ValueRule) -> None:
     """Convert and write block by block, in the memory of one."""
     # A mistake in the names is none of a line.
-    rule.results(Block([], []), source, target)
+    rule.results(NumberBlock([], []), source, target)
     told: set[str] = set()
     for block in blocks:
         try:
@@ -201,7 +203,7 @@ def _stream(blocks: Iterator[Block], source: str, target: str, rule: _Rule) -> N
 
 
 def _at_its_line(
-    error: MdfconvError, block: Block, source: str, target: str, rule: _Rule
+    error: MdfconvError, block: NumberBlock, source: str, target: str, rule: _ValueRule
 ) -> MdfconvError:
     """Return the error of the first value that has one, with its line of standard input."""
     if not block.lines:
@@ -210,12 +212,12 @@ def _at_its_line(
     while high - low > 1:
         middle = (low + high) // 2
         try:
-            rule.results(Block(block.numbers[low:middle], []), source, target)
+            rule.results(NumberBlock(block.numbers[low:middle], []), source, target)
             low = middle
         except MdfconvError:
             high = middle
     try:
-        rule.results(Block(block.numbers[low:high], []), source, target)
+        rule.results(NumberBlock(block.numbers[low:high], []), source, target)
     except MdfconvError as alone:
         reason = f"line {block.lines[low]} of standard input: {alone.reason}"
         return MdfconvError(reason, alone.hint)
@@ -237,7 +239,7 @@ def _write_plain(conversions: list[list[Conversion]], *, named: bool, free: bool
     typer.echo("\n".join(lines))
 
 
-def _write_tables(conversions: list[list[Conversion]], rule: _Rule) -> None:
+def _write_tables(conversions: list[list[Conversion]], rule: _ValueRule) -> None:
     """Write tables a target: the methods under the metric, and the fits under the others."""
     out = console()
     for group in conversions:
@@ -265,7 +267,7 @@ def _headings(conversion: Conversion) -> list[str]:
     )
 
 
-def _print_methods(group: list[Conversion], rule: _Rule) -> None:
+def _print_methods(group: list[Conversion], rule: _ValueRule) -> None:
     headings = _headings(group[0])
     rows, styles = [], []
     for conversion in group[:ROWS_SHOWN]:
@@ -279,7 +281,7 @@ def _print_methods(group: list[Conversion], rule: _Rule) -> None:
     print_table(list(rows[0]), rows, title, styles, count=len(group))
 
 
-def _print_metrics(group: list[Conversion], rule: _Rule) -> None:
+def _print_metrics(group: list[Conversion], rule: _ValueRule) -> None:
     headings = _headings(group[0])
     rows = []
     for conversion in group:
@@ -301,7 +303,7 @@ def _row(conversion: Conversion, headings: list[str], *, first: bool = True) -> 
     }
 
 
-def _answers(conversion: Conversion, rules: Iterator[_Rule]) -> Iterator[Conversion]:
+def _answers(conversion: Conversion, rules: Iterator[_ValueRule]) -> Iterator[Conversion]:
     """Yield what other rules make of a value; nothing for one that has no answer."""
     for rule in rules:
         with suppress(MdfconvError):

@@ -25,14 +25,15 @@ from mdfconv.cli.options import (
     chosen_gamma,
 )
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.tables import form_of, progress, tell, write_table
+from mdfconv.cli.process import tell
+from mdfconv.cli.tables import form_of, progress, write_table
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import cell_text
 from mdfconv.registry import ALL
 
 if TYPE_CHECKING:
-    from mdfconv.conversion.endpoint import Endpoint
     from mdfconv.distributions import Distribution
+    from mdfconv.distributions.endpoint import Endpoint
     from mdfconv.measured.analysis import Analysis, FitOptions
     from mdfconv.measured.readers import ReadOptions
 
@@ -222,7 +223,7 @@ def command(
     if len(files) > 1 and (png or report):
         raise MdfconvError("--png and --report are of one file")
     if report:
-        from mdfconv.reports.fit_report import check_report_name
+        from mdfconv.measured.report import check_report_name
 
         check_report_name(report)
     ends = _ends(targets or [])
@@ -241,7 +242,7 @@ def command(
     contents: dict[Path, bytes] = {}
     logarithms = loss is Loss.log
     if png:
-        from mdfconv.reports.fit_pages import draw_analysis
+        from mdfconv.measured.report import draw_analysis
 
         contents[png] = draw_analysis(analyses[0], logarithms=logarithms)
     if report:
@@ -307,8 +308,8 @@ def _analyses(
 
 def _analyse(path: Path, columns: ReadOptions, options: FitOptions, *, only_two: bool) -> Analysis:
     from mdfconv.measured.analysis import analyse
-    from mdfconv.measured.directional import DirectionalSamples
     from mdfconv.measured.readers import read
+    from mdfconv.measured.samples import DirectionalSamples
 
     samples = read(path, columns)
     if only_two and not isinstance(samples, DirectionalSamples):
@@ -338,8 +339,7 @@ def _table(
 def _report(
     analysis: Analysis, path: Path, ends: Sequence[Endpoint], *, separate: bool, logarithms: bool
 ) -> dict[Path, bytes]:
-    from mdfconv.reports.fit_pages import report_of
-    from mdfconv.reports.fit_report import report_files
+    from mdfconv.measured.report import report_files, report_of
 
     names, rows = _table([analysis], Format.markdown, ends, separate)
     if "specular" in names:
@@ -375,7 +375,7 @@ def _tell(analysis: Analysis, tolerance: float, *, named: bool) -> None:
 
 def _ends(names: Sequence[str]) -> list[Endpoint]:
     """Return what is named, each once; nothing for all."""
-    from mdfconv.conversion.endpoint import endpoint
+    from mdfconv.distributions.endpoint import endpoint
 
     if ALL in [name.strip().lower() for name in names]:
         return []

@@ -102,7 +102,7 @@ def command(
 def _comparison() -> tuple[list[str], list[dict[str, Any]], str]:
     from dataclasses import asdict
 
-    from mdfconv.paper.table2 import compare
+    from mdfconv.studies.table2 import compare
 
     rows = [asdict(cell) for cell in compare()]
     agreeing = sum(row["agrees"] for row in rows)
@@ -111,7 +111,7 @@ def _comparison() -> tuple[list[str], list[dict[str, Any]], str]:
 
 
 def _closed_forms(exposure: float | None) -> tuple[list[str], list[dict[str, Any]], str]:
-    from mdfconv.paper.closed_forms import refit_rows
+    from mdfconv.studies.closed_forms import refit_rows
 
     rows = refit_rows(every_metric(exposure))
     return list(rows[0]), rows, "Closed forms: coefficients and worst relative error"
@@ -120,7 +120,7 @@ def _closed_forms(exposure: float | None) -> tuple[list[str], list[dict[str, Any
 def _table(
     metric: Metric, sweep: str | None, m_b: list[float] | None, extended: bool
 ) -> tuple[list[str], list[dict[str, float]], str]:
-    from mdfconv.paper.table2 import fit_table
+    from mdfconv.studies.table2 import fit_table
 
     values, limit = _sweep(sweep, m_b)
     with progress("Fitting", values.size) as advance:
@@ -133,7 +133,7 @@ def _sweep(sweep: str | None, m_b: list[float] | None) -> tuple[Array, Array]:
     import numpy as np
 
     from mdfconv.distributions import distribution
-    from mdfconv.paper.table2 import angle_limit, paper_sweep
+    from mdfconv.studies.table2 import angle_limit, paper_sweep
 
     if sweep and m_b:
         raise MdfconvError("give either --sweep or --m-b")

@@ -25,7 +25,7 @@ from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
-    from mdfconv.formula import Problem
+    from mdfconv.formula import SearchProblem
 
 _COLUMNS = ("operations", "worst_error", "formula")
 
@@ -84,8 +84,8 @@ def command(
 
     mdfconv formula --from blinn-phong --to ggx --metric energy --all --lang latex
     """
-    from mdfconv.conversion.endpoint import endpoints, with_specular
-    from mdfconv.formula import LANGUAGES, Problem, cheapest, write_formula
+    from mdfconv.distributions.endpoint import endpoints, with_specular
+    from mdfconv.formula import LANGUAGES, SearchProblem, cheapest, write_formula
 
     if every:
         refuse_given(context, ["tolerance"], "does not go with --all, which has every error")
@@ -97,7 +97,7 @@ def command(
     first, last = endpoints(*with_specular(source, target, specular), fixed_gamma(gamma))
     ends = noted(first), noted(last)
     low, high = ends[0].stored.typical if range_ is None else _range(range_)
-    problem = Problem(*ends, chosen_metric(metric, exposure), low, high)
+    problem = SearchProblem(*ends, chosen_metric(metric, exposure), low, high)
     if every:
         title = f"Formulas from {ends[0].label} to {ends[1].label}, {low:g} to {high:g}"
         write_table(_COLUMNS, _rows(problem, language), format_, title=title)
@@ -116,7 +116,7 @@ def _range(text: str) -> tuple[float, float]:
     return ends
 
 
-def _rows(problem: Problem, language: str) -> list[dict[str, Any]]:
+def _rows(problem: SearchProblem, language: str) -> list[dict[str, Any]]:
     from mdfconv.formula import LANGUAGES, pareto_front
 
     return [

@@ -42,8 +42,8 @@ def command(
 
     mdfconv fresnel --format json
     """
-    from mdfconv.brdf.fresnel_fit import fit
-    from mdfconv.reports.fresnel_page import COLUMNS, draw_fresnel, error_rows
+    from mdfconv.studies.fresnel import fit
+    from mdfconv.studies.report.fresnel_page import COLUMNS, draw_fresnel, error_rows
 
     outputs = Outputs(png, table=output, force=force)
     fitted = fit(ior, mu, sigma)

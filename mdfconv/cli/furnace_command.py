@@ -20,8 +20,8 @@ from mdfconv.cli.tables import write_table
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
-    from mdfconv.brdf.furnace import FurnaceModel
     from mdfconv.distributions.evaluation import Array
+    from mdfconv.studies.furnace import FurnaceModel
 
 _NOT_OF_SPEED = ("normalizer", "masking", "points", "samples", "seed", "png")
 _MOST_POINTS = 1001
@@ -98,7 +98,7 @@ def command(
     """
     import numpy as np
 
-    from mdfconv.brdf.models import furnace_model
+    from mdfconv.studies.furnace import furnace_model
 
     if speed:
         if brdf != "modified-phong":
@@ -125,7 +125,7 @@ def command(
     label = f"{brdf} {parameter:g}"
     picture = {}
     if png:
-        from mdfconv.reports.furnace_figure import draw_albedo
+        from mdfconv.studies.report.furnace_figure import draw_albedo
 
         curve = {label: [row["albedo"] for row in rows]}
         picture[png] = draw_albedo([row["cos_theta"] for row in rows], {"": curve})
@@ -135,8 +135,8 @@ def command(
 
 def _decoded(brdf: str, value: float) -> tuple[str, float]:
     """Return the name of a BRDF and its parameter, for one in a stored form, too."""
-    from mdfconv.brdf.models import model_distribution
-    from mdfconv.conversion.endpoint import endpoint
+    from mdfconv.distributions.endpoint import endpoint
+    from mdfconv.studies.furnace import model_distribution
 
     name, colon, form = brdf.partition(":")
     if not colon:
@@ -150,8 +150,8 @@ def _decoded(brdf: str, value: float) -> tuple[str, float]:
 def _rows(
     model: FurnaceModel, cosine: Array, samples: int | None, seed: int
 ) -> list[dict[str, Any]]:
-    from mdfconv.brdf.furnace import directional_albedo, sampled_albedo
     from mdfconv.output.records import rounded_rows
+    from mdfconv.studies.furnace import directional_albedo, sampled_albedo
 
     columns = {"cos_theta": cosine, "albedo": directional_albedo(model, cosine)}
     if samples:
@@ -160,7 +160,7 @@ def _rows(
 
 
 def _write_speed(exponent: float, form: Format | None, outputs: Outputs) -> None:
-    from mdfconv.benchmark.normalizers import normalizer_speeds
+    from mdfconv.studies.bench.normalizers import normalizer_speeds
 
     rows = normalizer_speeds(exponent)
     title = f"Normalizers of modified Phong, γ = {exponent:g}"

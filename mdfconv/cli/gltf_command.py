@@ -34,9 +34,9 @@ from mdfconv.output.records import json_text
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from mdfconv.conversion.endpoint import Endpoint
+    from mdfconv.distributions.endpoint import Endpoint
     from mdfconv.fitting.metrics import Metric
-    from mdfconv.scene.gltf import GltfConversion
+    from mdfconv.scene.gltf.asset import GltfConversion
     from mdfconv.scene.material_files import Destination
 
 _HEADINGS = {
@@ -162,10 +162,10 @@ def _convert(
     compare: bool,
     form: ReportFormat,
 ) -> None:
-    from mdfconv.conversion.endpoint import with_specular
-    from mdfconv.scene.gltf import convert_gltf
-    from mdfconv.scene.gltf_factors import factor_endpoints
-    from mdfconv.scene.gltf_images import GltfTextures
+    from mdfconv.distributions.endpoint import with_specular
+    from mdfconv.scene.gltf.asset import convert_gltf
+    from mdfconv.scene.gltf.factors import factor_endpoints
+    from mdfconv.scene.gltf.images import GltfTextures
     from mdfconv.scene.shininess import ROUGHNESS, SHININESS
 
     names = with_specular(source, target or ROUGHNESS, specular)
@@ -198,7 +198,7 @@ def _convert(
 
 def _check_form(destination: Destination, data: bytes) -> None:
     """Refuse a name that says of a file that it is of the other form, which it does not become."""
-    from mdfconv.scene.gltf_container import is_glb
+    from mdfconv.scene.gltf.container import is_glb
 
     form = ".glb" if is_glb(data) else ".gltf"
     named = destination.output.suffix.lower()
@@ -223,7 +223,7 @@ def _tell_other_generator(path: Path, generator: str, source: Endpoint) -> None:
 def _proposals(generator: str) -> dict[str, str]:
     """Return the dialects that a generator lets expect, with the options that name them."""
     from mdfconv.distributions.dialects import Specular
-    from mdfconv.scene.gltf import dialects_by_generator
+    from mdfconv.scene.gltf.asset import dialects_by_generator
 
     proposals = {}
     for dialect in dialects_by_generator(generator):
@@ -236,8 +236,8 @@ def _proposals(generator: str) -> dict[str, str]:
 
 def _with_option(problem: str) -> str:
     """Return what is wrong with a material, with the option that helps."""
-    from mdfconv.scene.gltf import HAS_TEXTURE
-    from mdfconv.scene.images import ACCEPT_LOSSES
+    from mdfconv.scene.gltf.asset import HAS_TEXTURE
+    from mdfconv.scene.texture.images import ACCEPT_LOSSES
 
     if problem == HAS_TEXTURE:
         return f"{problem}: --textures converts it"
@@ -247,7 +247,7 @@ def _with_option(problem: str) -> str:
 def _propose(files: list[str]) -> None:
     """Print which source each file's generator lets expect."""
     from mdfconv.output.files import find_files
-    from mdfconv.scene.gltf import generator_of
+    from mdfconv.scene.gltf.asset import generator_of
     from mdfconv.scene.material_files import read_file
 
     lines = []

@@ -9,7 +9,8 @@ import typer
 
 from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.tables import console, form_of, tell, write_table
+from mdfconv.cli.process import tell
+from mdfconv.cli.tables import console, form_of, write_table
 from mdfconv.output.records import csv_text, json_text
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def command(
         rows = report.spectrum_rows()
         contents[spectrum] = file_bytes(csv_text(list(rows[0]), rows))
     if png:
-        from mdfconv.scene.light_figure import draw_spectrum
+        from mdfconv.scene.light import draw_spectrum
 
         contents[png] = draw_spectrum(report.spectrum, map_.name)
     outputs.write(contents)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from mdfconv.cli.tables import ROWS_SHOWN, print_table, tell
+from mdfconv.cli.process import tell
+from mdfconv.cli.tables import ROWS_SHOWN, print_table
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:

@@ -19,13 +19,13 @@ from mdfconv.cli.material_files import (
     print_materials,
 )
 from mdfconv.cli.options import ExposureOption, ForceOption, MetricOption, chosen_metric
-from mdfconv.cli.tables import tell
+from mdfconv.cli.process import tell
 from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
     from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.material_files import Destination
-    from mdfconv.scene.mitsuba import MitsubaConversion
+    from mdfconv.scene.mitsuba.convert import MitsubaConversion
 
 _HEADINGS = {
     "name": "BSDF", "line": "line", "distribution": "from", "value": "α", "result": "new α",
@@ -78,8 +78,8 @@ def command(
 
     mdfconv mitsuba scene.xml -o out --textures --compare --format json
     """
-    from mdfconv.scene.mitsuba import check_target, convert_mitsuba
-    from mdfconv.scene.mitsuba_textures import BitmapConverter
+    from mdfconv.scene.mitsuba.convert import check_target, convert_mitsuba
+    from mdfconv.scene.mitsuba.textures import BitmapConverter
 
     wanted = check_target(to)
     kept = chosen_metric(metric, exposure)
@@ -127,7 +127,7 @@ def _record(
     """Return what is said of a scene, of its first materials if there is a limit."""
     materials = [vars(each) | {"notes": list(each.notes)} for each in conversion.materials[:most]]
     if compare:
-        from mdfconv.scene.mitsuba import unchanged_errors
+        from mdfconv.scene.mitsuba.convert import unchanged_errors
 
         errors = unchanged_errors(conversion.materials[:most], target, metric)
         for row, error in zip(materials, errors, strict=True):

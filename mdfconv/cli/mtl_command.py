@@ -34,8 +34,8 @@ from mdfconv.output.records import json_text
 if TYPE_CHECKING:
     from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.material_files import Destination
-    from mdfconv.scene.mtl import MtlConversion
-    from mdfconv.scene.mtl_textures import MtlTextures
+    from mdfconv.scene.mtl.library import MtlConversion
+    from mdfconv.scene.mtl.textures import MtlTextures
 
 _HEADINGS = {
     "name": "material", "shininess": "Ns", "roughness": "Pr", "rmse": "RMSE", "notes": "notes",
@@ -98,7 +98,7 @@ def command(
 
     mdfconv mtl --to shininess chair-pbr.mtl -o chair-phong.mtl
     """
-    from mdfconv.scene.mtl import convert_mtl
+    from mdfconv.scene.mtl.library import convert_mtl
 
     wanted = to.strip().lower()
     if wanted != "roughness" and (compare or textures):
@@ -145,8 +145,8 @@ def _convert_textures(
     destination: Destination, data: bytes, metric: Metric, exponent_max: float
 ) -> MtlTextures:
     """Convert the textures of a library."""
-    from mdfconv.scene.mtl import texture_statements
-    from mdfconv.scene.mtl_textures import convert_textures
+    from mdfconv.scene.mtl.library import texture_statements
+    from mdfconv.scene.mtl.textures import convert_textures
 
     textures = texture_statements(data)
     paths = destination.source, destination.output

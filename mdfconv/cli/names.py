@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mdfconv.cli.process import tell
 
 if TYPE_CHECKING:
-    from mdfconv.conversion.endpoint import Endpoint
+    from mdfconv.distributions.endpoint import Endpoint
 
 
 def noted(end: Endpoint) -> Endpoint:
@@ -27,7 +27,7 @@ def asked_endpoint(name: str) -> Endpoint:
     MdfconvError
         As `one_parameter_endpoint`.
     """
-    from mdfconv.conversion.endpoint import one_parameter_endpoint
+    from mdfconv.distributions.endpoint import one_parameter_endpoint
 
     return noted(one_parameter_endpoint(name))
 

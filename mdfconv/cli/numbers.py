@@ -22,7 +22,7 @@ _BLOCK = 1 << 21
 
 
 @dataclass(frozen=True)
-class Block:
+class NumberBlock:
     """Values that are converted together.
 
     Parameters
@@ -42,7 +42,7 @@ class Block:
         return any(isinstance(number, tuple) for number in self.numbers)
 
 
-def read_blocks(values: list[str]) -> Iterator[Block]:
+def read_blocks(values: list[str]) -> Iterator[NumberBlock]:
     """Yield the values of the arguments, with standard input in place of ``-``.
 
     Raises
@@ -56,17 +56,17 @@ def read_blocks(values: list[str]) -> Iterator[Block]:
     for position, text in enumerate(values, start=1):
         if text == _INPUT:
             if numbers:
-                yield Block(numbers, [])
+                yield NumberBlock(numbers, [])
                 numbers = []
             yield from _input_blocks()
         else:
             where = f"value {position} of {len(values)}: " if len(values) > 1 else ""
             numbers.append(_number(text, where))
     if numbers:
-        yield Block(numbers, [])
+        yield NumberBlock(numbers, [])
 
 
-def _input_blocks() -> Iterator[Block]:
+def _input_blocks() -> Iterator[NumberBlock]:
     if sys.stdin is None:
         raise MdfconvError("standard input is closed")
     start, empty = 1, True
@@ -85,14 +85,14 @@ def _input_blocks() -> Iterator[Block]:
         raise MdfconvError("standard input holds no values")
 
 
-def _block(lines: list[str], start: int) -> Block:
+def _block(lines: list[str], start: int) -> NumberBlock:
     try:
-        return Block(list(map(float, lines)), list(range(start, start + len(lines))))
+        return NumberBlock(list(map(float, lines)), list(range(start, start + len(lines))))
     except ValueError:
         # Pairs and blank lines, or a mistake.
         kept = [(line.strip(), number) for number, line in enumerate(lines, start) if line.strip()]
         numbers = [_number(text, f"line {number} of standard input: ") for text, number in kept]
-        return Block(numbers, [number for _, number in kept])
+        return NumberBlock(numbers, [number for _, number in kept])
 
 
 def _number(text: str, where: str) -> Number:

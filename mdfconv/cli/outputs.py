@@ -11,13 +11,7 @@ import typer
 
 from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
-from mdfconv.output.files import (
-    StagedFiles,
-    create_folder,
-    exists_refusal,
-    is_stream,
-    staged_files,
-)
+from mdfconv.output.files import StagedFiles, create_folder, exists_refusal, is_stream, staged_files
 
 _DEFAULT_FOLDER = Path("reports")
 

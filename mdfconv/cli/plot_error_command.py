@@ -27,9 +27,9 @@ from mdfconv.errors import MdfconvError
 from mdfconv.output.files import file_bytes
 
 if TYPE_CHECKING:
-    from mdfconv.conversion.endpoint import Endpoint
+    from mdfconv.distributions.endpoint import Endpoint
     from mdfconv.fitting.metrics import Metric
-    from mdfconv.paper.error_curves import Curves
+    from mdfconv.studies.error_curves import Curves
 
 _REFERENCE = "beckmann"
 _COLUMNS = ("figure", "distribution", "parameter", "max_error_percent", "beta_rad")
@@ -85,7 +85,7 @@ def command(
     mdfconv plot-error --m-b 0.2 --reference ggx --mdf beckmann --no-csv --output /tmp
     """
     from mdfconv.conversion.arrays import given_metric
-    from mdfconv.paper.error_curves import curves
+    from mdfconv.studies.error_curves import curves
 
     if not png and not svg:
         refuse_given(context, ["dpi", "log"], "is of pictures: give no --no-png, or --svg")
@@ -120,7 +120,7 @@ def _sets(
     ends: Sequence[Endpoint],
 ) -> dict[str, dict[str, float]]:
     """Return the parameters of each figure by its name."""
-    from mdfconv.paper.error_curves import DRAWN, PAPER_SETS, parameters_for
+    from mdfconv.studies.error_curves import DRAWN, PAPER_SETS, parameters_for
 
     names = list(dict.fromkeys(end.distribution.name for end in ends))
     if m_b:
@@ -150,7 +150,7 @@ def _file(name: str, drawn: Curves, end: str, *, dpi: int, log: bool) -> bytes:
     """Return the content of a figure's file by what its name ends in."""
     if end == "b.csv":
         return file_bytes(drawn.error_text())
-    from mdfconv.paper.error_figure import draw_errors
+    from mdfconv.studies.error_curves import draw_errors
 
     title = f"{drawn.reference} and its substitutes ({name})"
     return draw_errors(drawn, title, form=end.removeprefix("."), dpi=dpi, log=log)

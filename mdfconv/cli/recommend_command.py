@@ -17,18 +17,12 @@ from mdfconv.cli.options import (
     chosen_metric,
     fixed_gamma,
 )
-from mdfconv.cli.tables import (
-    console,
-    form_of,
-    print_table,
-    table_text,
-    tell,
-    value_text,
-)
+from mdfconv.cli.process import tell
+from mdfconv.cli.tables import console, form_of, print_table, table_text, value_text
 from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
-    from mdfconv.benchmark.recommendation import Recommendation
+    from mdfconv.recommend import Recommendation
 
 _FOOTNOTE = (
     "[dim]Errors: root mean square and maximum under the metric, relative to the source's. "
@@ -71,9 +65,9 @@ def command(
 
     mdfconv recommend --from ggx:roughness 0.5 --tolerance 0.1 --metric display --format json
     """
-    from mdfconv.benchmark.recommendation import recommend
-    from mdfconv.conversion.endpoint import with_gamma
     from mdfconv.distributions import one_parameter_distributions
+    from mdfconv.distributions.endpoint import with_gamma
+    from mdfconv.recommend import recommend
 
     end = with_gamma(asked_endpoint(source), fixed_gamma(gamma))
     kept = chosen_metric(metric, exposure)

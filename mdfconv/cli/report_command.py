@@ -22,7 +22,7 @@ def command(
 
     mdfconv report --output /tmp/mdfconv-report
     """
-    from mdfconv.reports.build import COUNT, ELSEWHERE, FILES, build, report_files
+    from mdfconv.studies.report.build import COUNT, ELSEWHERE, FILES, build, report_files
 
     folder = check_folder(context, output)
     outputs = Outputs(*(folder / name for name in FILES), force=force)

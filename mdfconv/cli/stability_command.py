@@ -56,8 +56,7 @@ def command(
     """
     from dataclasses import asdict, fields
 
-    from mdfconv.benchmark.stability import audit
-    from mdfconv.benchmark.stability_finding import Finding
+    from mdfconv.studies.stability import Finding, audit
 
     outputs = Outputs(table=output, force=force)
     rows = [asdict(finding) for finding in audit(mdf or (), part)]

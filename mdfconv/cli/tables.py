@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, TextIO
 import typer
 
 from mdfconv.cli.options import Format
-from mdfconv.cli.process import tell as tell
+from mdfconv.cli.process import tell
 from mdfconv.distributions.parameter import number_text
 from mdfconv.output.records import Record, cell_text, csv_text, json_text, markdown_text
 

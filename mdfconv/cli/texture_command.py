@@ -23,7 +23,8 @@ from mdfconv.cli.options import (
     refuse_idle_metric,
 )
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.tables import progress, tell
+from mdfconv.cli.process import tell
+from mdfconv.cli.tables import progress
 
 
 class Depth(StrEnum):
@@ -111,9 +112,9 @@ def command(
 
     mdfconv texture orm.png -o new.png --channel g --from ggx:roughness --to ggx:alpha --depth 8
     """
-    from mdfconv.conversion.endpoint import with_specular
-    from mdfconv.scene.texture import convert_texture_file
-    from mdfconv.scene.texture_rule import TextureRule
+    from mdfconv.distributions.endpoint import with_specular
+    from mdfconv.scene.texture.convert import convert_texture_file
+    from mdfconv.scene.texture.rule import TextureRule
 
     _check_given(context, source, target)
     refuse_idle_metric(context, method)
@@ -141,7 +142,7 @@ def command(
             files=files,
         )
         if png:
-            from mdfconv.scene.texture_figure import draw_histograms
+            from mdfconv.scene.texture.figure import draw_histograms
 
             files.add(png, draw_histograms(report, f"{source_file.name} → {output.name}"))
     for note in report.notes():

@@ -3,21 +3,217 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable, Iterable
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from mdfconv.conversion.cautions import warn_of
-from mdfconv.conversion.endpoint import Endpoint, endpoints
-from mdfconv.conversion.method import Method
-from mdfconv.conversion.methods import default_method, method_named
-from mdfconv.conversion.refusals import check_covered, check_pair, unreachable
-from mdfconv.conversion.threads import in_threads
+from mdfconv.conversion.methods import Method, default_method, list_methods, method_named
+from mdfconv.distributions import list_distributions
+from mdfconv.distributions.endpoint import Endpoint, endpoints
 from mdfconv.distributions.equivalence import exact_route, follow
-from mdfconv.distributions.evaluation import Array, Mask, as_operand
+from mdfconv.distributions.evaluation import Array, Mask, as_operand, in_parts, worth_threads
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError, MdfconvWarning
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
+
+
+def in_threads(function: Callable[[Any], Array], values: Any, threads: int) -> Array:
+    """Return an elementwise function of a large array, computed in parts by threads.
+
+    Parameters
+    ----------
+    function : callable
+        From an array to one of floats in its shape.
+    values : float or numpy.ndarray
+        A small array, and a number, is computed at once.
+    threads : int
+        How many run at a time, from 1.
+
+    Raises
+    ------
+    MdfconvError
+        If the number of threads makes no sense, or as the function does for all of the values.
+    """
+    size = np.size(values)
+    if not worth_threads(size, threads):
+        return function(values)
+    flat, result = values.reshape(-1), np.empty(size)
+
+    def compute(low: int, high: int) -> None:
+        result[low:high] = function(flat[low:high])
+
+    try:
+        in_parts(compute, size, threads)
+    except MdfconvError:
+        # What is wrong is said of all the values, not of a part.
+        return function(values)
+    return result.reshape(values.shape)
+
+
+# So many are looked at sooner than their ends are found.
+_FEW = 16
+
+
+def cautions_of(
+    method: Method,
+    parameter: Array,
+    result: Array,
+    stored: Array,
+    source: Endpoint,
+    target: Endpoint,
+) -> dict[str, Mask]:
+    """Return sentences, and which of some conversions they are true of.
+
+    Parameters
+    ----------
+    method : Method
+        By which they were made, unless both lobes are the same.
+    parameter, result : numpy.ndarray, shape (n,)
+        Parameters of the source and the target.
+    stored : numpy.ndarray, shape (n,)
+        The results as the target stores them.
+    source, target : Endpoint
+        The ends of the conversions.
+    """
+    every = np.ones(parameter.shape, bool)
+    cautions = {end.caution: every for end in (source, target) if end.caution}
+    for text, which in target.clamped(stored).items():
+        cautions[f"{target.label} clamps: {text}"] = which
+    pair = source.distribution, target.distribution
+    if exact_route(*pair) is None:
+        cautions |= method.cautions(parameter, result, *pair)
+    return cautions
+
+
+def warn_of(
+    method: Method,
+    conversions: Iterable[tuple[Any, Any]],
+    source: Endpoint,
+    target: Endpoint,
+    stacklevel: int,
+) -> None:
+    """Warn once of all that arrays of conversions call for.
+
+    Only their least and largest numbers are looked at, as what calls for a caution lies beyond a
+    limit; and only where there may be a caution.
+
+    Parameters
+    ----------
+    method, source, target
+        As for `cautions_of`.
+    conversions : iterable of two array_like
+        Stored values and results, in the same shape.
+    stacklevel : int
+        Of the warning, as `warnings.warn` takes it in the calling function.
+    """
+    clamps = target.encoding is not None and bool(target.encoding.clamps)
+    silent = not method.has_cautions or source.distribution.is_same(target.distribution)
+    if silent and not clamps and not source.caution and not target.caution:
+        return
+    sentences: dict[str, None] = {}
+    for values, results in conversions:
+        given = _ends(values)
+        # A caution about results is about those at the end of a range.
+        stored = _ends(results) if clamps or method.follows_metric else given
+        with np.errstate(all="ignore"):
+            parameter, result = source.decode_legal(given), target.decode_legal(stored)
+            cautions = cautions_of(method, parameter, result, stored, source, target)
+        sentences |= dict.fromkeys(text for text, which in cautions.items() if which.any())
+    if sentences:
+        warnings.warn("; ".join(sentences), MdfconvWarning, stacklevel=stacklevel + 1)
+
+
+def _ends(values: Any) -> Array:
+    """Return the least and the largest of numbers, leaving out NaN (float64); few as they are."""
+    array = np.asarray(values)
+    if array.size < _FEW:
+        return array.astype(float).ravel()
+    ends = np.array([array.min(), array.max()], float)
+    return ends if not np.isnan(ends[0]) else np.array([np.nanmin(array), np.nanmax(array)], float)
+
+
+def check_covered(method: Method, metric: Metric, source: Endpoint, target: Endpoint) -> None:
+    """Raise unless a method has a conversion for a pair under a metric."""
+    pair = source.distribution, target.distribution
+    if method.route(*pair) is None:
+        others = [other.name for other in list_methods() if other.route(*pair) is not None]
+        raise MdfconvError(
+            f"{method.name} has no conversion from {pair[0].label} to {pair[1].label}",
+            f"use {' or '.join(others)}",
+        )
+    if not method.covers(*pair, metric):
+        raise MdfconvError(
+            f"{method.name} has no conversion stored from {pair[0].label} to {pair[1].label} "
+            f"under the {metric} metric",
+            "use fit",
+        )
+
+
+def check_pair(axes: tuple[Any, ...], source: Endpoint, target: Endpoint) -> None:
+    """Raise unless a pair of parameters is one, and both ends take it."""
+    if len(axes) != 2:
+        raise MdfconvError(f"a pair of parameters has two members, not {len(axes)}")
+    for end in (source, target):
+        mdf = end.distribution
+        if not mdf.anisotropic:
+            others = [
+                other.name
+                for other in list_distributions()
+                if other.anisotropic and other.equivalent and other.equivalent.name == mdf.name
+            ]
+            raise MdfconvError(
+                f"{mdf.name} is isotropic: it takes one parameter, not a pair",
+                f"use {others[0]}" if others else "",
+            )
+
+
+def unreachable(
+    method: Method,
+    metric: Metric,
+    parameter: Array,
+    result: Array,
+    index: int,
+    source: Endpoint,
+    target: Endpoint,
+) -> MdfconvError:
+    """Return the error for a result that is illegal, naming the methods that answer."""
+    pair = source.distribution, target.distribution
+    value, outcome = (float(array.flat[index]) for array in (parameter, result))
+    limits = pair[1].parameter
+    which = f" (value {index + 1} of {parameter.size})" if parameter.size > 1 else ""
+    start = f"for {pair[0].name} {pair[0].parameter.symbol} = {number_text(value)}{which}"
+    if np.isnan(outcome):
+        covered = method.range_text(*pair, metric)
+        why = f"has no answer in {pair[1].label}"
+        why += f": it covers {covered}" if covered else f", outside {limits.legal}"
+    else:
+        why = f"gives {pair[1].label} {limits.symbol} = {number_text(outcome)}"
+        storable = limits.accepts(np.asarray(outcome))
+        why += f", which {target.label} cannot store" if storable else ""
+        why += f", outside {target.stored.legal if storable else limits.legal}"
+    answers = _answers(method, metric, value, source, target)
+    if not answers:
+        return MdfconvError(f"{start} {method.name} {why}", "no method answers")
+    return MdfconvError(f"{start} {method.name} {why}", answers, argument="method")
+
+
+def _answers(
+    refused: Method, metric: Metric, value: float, source: Endpoint, target: Endpoint
+) -> str:
+    """Return what the other methods make of a value, in words."""
+    pair = source.distribution, target.distribution
+    answers: list[str] = []
+    for method in list_methods():
+        if method.name == refused.name or not method.covers(*pair, metric):
+            continue
+        with np.errstate(all="ignore"):
+            stored = target.encode(method.convert(np.asarray([value]), *pair, metric))
+        if target.stored.accepts(stored)[0]:
+            verb = "" if answers else " answers"
+            answers.append(f"{method.name}{verb} {number_text(float(stored[0]))}")
+    return ", ".join(answers)
+
 
 FREE: Literal["free"] = "free"
 Gamma: TypeAlias = float | Literal["free"] | None

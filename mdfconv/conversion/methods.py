@@ -5,23 +5,425 @@ A new method is a module that defines ``METHOD``, and one line in `_MODULES`.
 
 from __future__ import annotations
 
-from importlib import import_module
+from abc import ABC, abstractmethod
+from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 
-from mdfconv.conversion.least_squares import LeastSquares
-from mdfconv.conversion.method import Method
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.evaluation import Array
-from mdfconv.fitting.metrics import Metric
+from mdfconv.distributions.equivalence import ParameterMap, follow, from_root, to_root
+from mdfconv.distributions.evaluation import Array, Mask
+from mdfconv.distributions.parameter import number_text
+from mdfconv.fitting.maps import StoredFit
+from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.registry import Registry
 
+
+class Method(ABC):
+    """A rule that takes the parameter of one distribution to that of another."""
+
+    name: ClassVar[str]
+    source: ClassVar[str]
+    # Whether the answer depends on the metric; else that is only what the errors measure.
+    follows_metric: ClassVar[bool] = False
+    # Whether elements of an array that have no answer become NaN, with a warning.
+    gaps_as_nan: ClassVar[bool] = False
+
+    @property
+    def has_cautions(self) -> bool:
+        """Whether a conversion may call for a caution."""
+        return type(self).cautions is not Method.cautions
+
+    @abstractmethod
+    def keeps(self, metric: Metric) -> str:
+        """Return what the conversion keeps, to follow the word "keeps"."""
+
+    @abstractmethod
+    def route(self, source: Distribution, target: Distribution) -> tuple[str, ...] | None:
+        """Return the steps of the conversion in words; None if the pair is not covered."""
+
+    @abstractmethod
+    def convert(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> Array:
+        """Return target parameters (float64), for a pair that is covered.
+
+        Where the rule leaves the target's legal range it returns what it computes; where it
+        computes nothing, NaN.
+        """
+
+    def covers(self, source: Distribution, target: Distribution, metric: Metric) -> bool:
+        """Return whether the method can answer for a pair under a metric."""
+        return self.route(source, target) is not None
+
+    def answered_by(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> list[str]:
+        """Return the name of the method that answers each value, for a pair that is covered."""
+        return [self.name] * parameter.size
+
+    def range_text(self, source: Distribution, target: Distribution, metric: Metric) -> str:
+        """Return which parameters of the source a method with a range of its own covers."""
+        return ""
+
+    def cautions(
+        self, parameter: Array, result: Array, source: Distribution, target: Distribution
+    ) -> dict[str, Mask]:
+        """Return what a careful user must know of conversions, beyond their error.
+
+        Returns
+        -------
+        dict of str to numpy.ndarray of bool
+            From sentences to which of the conversions they are true of.
+        """
+        return {}
+
+
+class FormulaMethod(Method):
+    """A method made of formulas, looked up by the names of source and target.
+
+    A distribution that is another one in another parameter goes through that one's formulas.
+
+    Parameters
+    ----------
+    formulas : dict
+        From (source, target) to the formula.
+    through : dict
+        From the name of a distribution to that of the one all its formulas lead through.
+    """
+
+    def __init__(
+        self, formulas: dict[tuple[str, str], ParameterMap], through: dict[str, str] | None = None
+    ) -> None:
+        self._formulas = formulas
+        self._through = through or {}
+
+    def route(self, source: Distribution, target: Distribution) -> tuple[str, ...] | None:
+        """Return the formulas of the conversion; None if the pair is not covered."""
+        steps = self._steps(source, target)
+        return None if steps is None else tuple(step.text for step in steps if step.text)
+
+    def convert(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> Array:
+        """Apply the formulas one after the other; NaN where one leaves the positive numbers."""
+        for number, step in enumerate(self._steps(source, target) or ()):
+            if number:
+                parameter = np.where(parameter > 0, parameter, np.nan)
+            parameter = step.function(parameter)
+        return parameter
+
+    def cautions(
+        self, parameter: Array, result: Array, source: Distribution, target: Distribution
+    ) -> dict[str, Mask]:
+        """Say where a formula is used beyond the point at which it turns around."""
+        cautions = {}
+        for step in self._steps(source, target) or ():
+            sentence = f"beyond {step.turns_at:.3g} the formula {step.text} turns around"
+            cautions[sentence] = parameter > step.turns_at
+            parameter = step.function(parameter)
+        return cautions
+
+    def _steps(self, source: Distribution, target: Distribution) -> list[ParameterMap] | None:
+        first, forward = to_root(source, same_lobe=False)
+        last, _ = to_root(target, same_lobe=False)
+        path = self._path(first, last)
+        return None if path is None else [*forward, *path, *from_root(target, same_lobe=False)]
+
+    def _path(self, source: Distribution, target: Distribution) -> list[ParameterMap] | None:
+        # Formulas speak of the distributions as they stand in the registry.
+        if source.is_same(target):
+            return []
+        if source.second_parameter or target.second_parameter:
+            return None
+        names = source.name, target.name
+        if names in self._formulas:
+            return [self._formulas[names]]
+        for via in (self._through.get(name) for name in names):
+            if via and {(names[0], via), (via, names[1])} <= self._formulas.keys():
+                return [self._formulas[names[0], via], self._formulas[via, names[1]]]
+        return None
+
+
+# What the paper's sweep m_B ∈ [0.0044, 0.4473] (its Table 2) covers, in each parameter.
+_SWEEP = {
+    "beckmann": (0.0044, 0.4473),
+    "gauss": (0.0044, 0.4970),
+    "blinn-phong": (10.0, 1e5),
+    "sawicki": (9.218, 117400.0),
+    "ggx": (0.005364, 0.4865),
+}
+
+
+def _turning_point(linear: float, cubic: float) -> float:
+    """Return where linear x − cubic x³ has its maximum."""
+    return float(np.sqrt(linear / (3 * cubic)))
+
+
+_FORMULAS = {
+    ("beckmann", "blinn-phong"): ParameterMap(
+        "N = 2/m_B² − 2.5 (eq. 12)", lambda m: 2 / m**2 - 2.5
+    ),
+    ("blinn-phong", "beckmann"): ParameterMap(
+        "m_B = √2/√(N+2.5) (eq. 12)", lambda n: np.sqrt(2) / np.sqrt(n + 2.5)
+    ),
+    ("beckmann", "gauss"): ParameterMap(
+        "m_G = 0.5591 m_B³ + m_B (eq. 13)", lambda m: m * (1 + 0.5591 * m * m)
+    ),
+    ("gauss", "beckmann"): ParameterMap(
+        "m_B = m_G − 0.4134 m_G³ (eq. 13)",
+        lambda m: m * (1 - 0.4134 * m * m),
+        _turning_point(1, 0.4134),
+    ),
+    ("gauss", "blinn-phong"): ParameterMap("N = 2/m_G² − 0.5 (eq. 14)", lambda m: 2 / m**2 - 0.5),
+    ("blinn-phong", "gauss"): ParameterMap(
+        "m_G = √2/√(N+0.5) (eq. 14)", lambda n: np.sqrt(2) / np.sqrt(n + 0.5)
+    ),
+    ("blinn-phong", "sawicki"): ParameterMap(
+        "N_DS = 1.174 N + 0.3 (eq. 15)", lambda n: 1.174 * n + 0.3
+    ),
+    ("sawicki", "blinn-phong"): ParameterMap(
+        "N = (N_DS − 0.3)/1.174 (eq. 15)", lambda n: (n - 0.3) / 1.174
+    ),
+    ("ggx", "gauss"): ParameterMap(
+        "m_G = 0.8222 C + 0.82 C³ (Table 3)", lambda c: c * (0.8222 + 0.82 * c * c)
+    ),
+    ("ggx", "beckmann"): ParameterMap(
+        "m_B = 0.8388 C + 0.7 C⁴ (Table 3)", lambda c: c * (0.8388 + 0.7 * c**3)
+    ),
+    ("ggx", "blinn-phong"): ParameterMap(
+        "N = 1.696²/C² − 4.5 (Table 3)", lambda c: 1.696**2 / c**2 - 4.5
+    ),
+    ("gauss", "ggx"): ParameterMap(
+        "C = 1.186 m_G − 0.835 m_G³ (Table 4)",
+        lambda m: m * (1.186 - 0.835 * m * m),
+        _turning_point(1.186, 0.835),
+    ),
+    ("beckmann", "ggx"): ParameterMap(
+        "C = 1.2 m_B − 0.56 m_B³ (Table 4)",
+        lambda m: m * (1.2 - 0.56 * m * m),
+        _turning_point(1.2, 0.56),
+    ),
+    ("blinn-phong", "ggx"): ParameterMap(
+        "C = 1.697/√(N+4.5) (Table 4)", lambda n: 1.697 / np.sqrt(n + 4.5)
+    ),
+}
+
+
+@lru_cache(maxsize=64)
+def _sweep(source: Distribution) -> list[float]:
+    """Return the ends of the paper's sweep in the parameter of a distribution."""
+    root, _ = to_root(source, same_lobe=False)
+    ends = np.array(_SWEEP[root.name])
+    return [float(f"{end:.6g}") for end in follow(from_root(source, same_lobe=False), ends)]
+
+
+class ClosedForm(FormulaMethod):
+    """The paper's formulas, fitted by it to Table 2: they keep the shape of the lobe.
+
+    They were fitted for m_B from 0.0044 to 0.4473. The two directions of a pair are not
+    exact inverses of each other.
+    """
+
+    name = "closed-form"
+    source = "Sawicki 2021, eqs (12)-(15), Tables 3 and 4"
+
+    def keeps(self, metric: Metric) -> str:
+        """Return that the formulas keep the shape, whatever the metric of the errors."""
+        return "shape of the lobe, approximately"
+
+    def cautions(
+        self, parameter: Array, result: Array, source: Distribution, target: Distribution
+    ) -> dict[str, Mask]:
+        """Add to the turning points whether the source is outside the paper's sweep."""
+        lower, upper = _sweep(source)
+        outside = (
+            f"outside the paper's sweep: its formulas were fitted for {source.name} "
+            f"{source.parameter.symbol} from {number_text(lower)} to {number_text(upper)}"
+        )
+        turned = super().cautions(parameter, result, source, target)
+        return {outside: (parameter < lower) | (parameter > upper)} | turned
+
+
+_CLOSED_FORM = ClosedForm(_FORMULAS, through={"sawicki": "blinn-phong"})
+
+
+class HalfAngle(Method):
+    """Both distributions fall to half of their value at the normal at the same angle."""
+
+    name = "half-angle"
+    source = "Blinn 1977; Sawicki 2021, eqs (3)-(10)"
+
+    def keeps(self, metric: Metric) -> str:
+        """Return what the method is named for."""
+        return "angle of half height"
+
+    def route(self, source: Distribution, target: Distribution) -> tuple[str, ...]:
+        """Return the one step, which exists for every pair."""
+        return ("β_half of the source = β_half of the target",)
+
+    def convert(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> Array:
+        """Go through tan β_half; NaN where a distribution never falls to one half."""
+        result: Array = target.from_half_tangent(source.half_tangent(parameter))
+        return result
+
+
+_HALF_ANGLE = HalfAngle()
+
+
+class Ward(FormulaMethod):
+    """m_B² N = 2: the rule of thumb of Ward 1996, eq. (11) in Sawicki 2021."""
+
+    name = "ward"
+    source = "Ward 1996; Sawicki 2021, eq. (11)"
+
+    def keeps(self, metric: Metric) -> str:
+        """Return the rule keeps roughly the shape."""
+        return "shape of a smooth lobe, roughly"
+
+
+_WARD = Ward(
+    {
+        ("beckmann", "blinn-phong"): ParameterMap("N = 2/m_B² (eq. 11)", lambda m: 2 / m**2),
+        ("blinn-phong", "beckmann"): ParameterMap(
+            "m_B = √(2/N) (eq. 11)", lambda n: np.sqrt(2 / n)
+        ),
+    }
+)
+
+
+class Peak(Method):
+    """Both normalized forms have the same value at the normal, D(0) = 1/(π α²).
+
+    Between Beckmann and GGX this is equal α; between Beckmann and Blinn/Phong it is
+    m = √(2/(N+2)), the usual rule between roughness and shininess.
+    """
+
+    name = "peak"
+    source = "equal D(0); for Blinn/Phong m = √(2/(N+2))"
+
+    def keeps(self, metric: Metric) -> str:
+        """Return what the method is named for."""
+        return "peak of the normalized form"
+
+    def route(self, source: Distribution, target: Distribution) -> tuple[str, ...]:
+        """Return the one step, which exists for every pair."""
+        return ("D(0) of the source = D(0) of the target",)
+
+    def convert(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> Array:
+        """Go through the α with that peak; NaN where the target has no such peak."""
+        result: Array = target.from_peak_alpha(source.peak_alpha(parameter))
+        return result
+
+
+_PEAK = Peak()
+
+
+class LeastSquares(Method):
+    """The target with the smallest squared distance from the source over the hemisphere.
+
+    The metric says which distance: of the unit forms (shape), of the normalized forms (light),
+    or of what a screen shows of them (picture).
+    """
+
+    name = "fit"
+    source = "least squares, mdfconv.fitting"
+    follows_metric = True
+
+    def keeps(self, metric: Metric) -> str:
+        """Return what the metric keeps."""
+        return metric.keeps
+
+    def route(self, source: Distribution, target: Distribution) -> tuple[str, ...]:
+        """Return the one step, which exists for every pair."""
+        return ("least squares",)
+
+    def convert(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> Array:
+        """Fit every value; NaN where the fit tends to the open end of the legal range."""
+        from mdfconv.fitting.solve import fit
+
+        return fit(source, parameter.ravel(), target, metric).parameter.reshape(parameter.shape)
+
+    def cautions(
+        self, parameter: Array, result: Array, source: Distribution, target: Distribution
+    ) -> dict[str, Mask]:
+        """Say where the best fit is the end of the target's range."""
+        limits = target.parameter
+        sentence = f"the best fit lies at the end of the legal range of {target.name}"
+        return {sentence: (result == limits.upper) & limits.upper_closed}
+
+
+_FIT = LeastSquares()
+
+
+# Fewer values are fitted sooner than a map is made.
+_MANY = 8192
+
+
+class Fast(Method):
+    """The least-squares fit from stored polynomials: 1e-6 from it, 1e-5 for a display.
+
+    Covers the usual range of the source (N from 0.1) as far as the fit does and the target
+    stays usable, under the metrics for which there are maps. For a display at another exposure
+    than 1 many values have a map made for them, within 1e-4.
+    """
+
+    name = "fast"
+    source = "least squares, mdfconv.fitting, as stored polynomials"
+    follows_metric = True
+    gaps_as_nan = True
+
+    def keeps(self, metric: Metric) -> str:
+        """Return what the metric keeps."""
+        return metric.keeps
+
+    def route(self, source: Distribution, target: Distribution) -> tuple[str, ...] | None:
+        """Return the one step; None for pairs without maps, such as those of GTR."""
+        metrics = map(metric_named, list_metrics())
+        covered = any(self.covers(source, target, metric) for metric in metrics)
+        return ("stored least squares",) if covered else None
+
+    def covers(self, source: Distribution, target: Distribution, metric: Metric) -> bool:
+        """Return whether there is a map, one to make others from, or a constant."""
+        return _stored(source, target, metric).known
+
+    def convert(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> Array:
+        """Evaluate the polynomials; NaN outside their range."""
+        stored = _stored(source, target, metric)
+        if len(metric.from_stored()) > 1 and not stored.exact:
+            from mdfconv.fitting.map_making import made_map
+
+            if parameter.size < _MANY:
+                return _FIT.convert(parameter, source, target, metric)
+            stored = stored.with_map(made_map(*stored.pair, str(metric)))
+        return stored(parameter)
+
+    def range_text(self, source: Distribution, target: Distribution, metric: Metric) -> str:
+        """Return which parameters of the source the stored maps cover."""
+        return _stored(source, target, metric).range_text()
+
+
+def _stored(source: Distribution, target: Distribution, metric: Metric) -> StoredFit:
+    """Return what is stored under a metric, or under the one that it is followed from."""
+    return StoredFit(source, target, metric.from_stored()[0])
+
+
+_FAST_FIT = Fast()
+
+
 _DEFAULT, _FAST = "closed-form", "fast"
-_MODULES = ("closed_form", "half_angle", "ward", "peak", "least_squares", "fast")
 
 _REGISTRY: Registry[Method] = Registry("method")
-for _module in _MODULES:
-    _method = import_module(f"mdfconv.conversion.{_module}").METHOD
+for _method in (_CLOSED_FORM, _HALF_ANGLE, _WARD, _PEAK, _FIT, _FAST_FIT):
     _REGISTRY.add(_method.name, _method)
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mdfconv.distributions.base import AnisotropicDistribution
+from mdfconv.distributions.base import AnisotropicDistribution, Equivalent
 from mdfconv.distributions.blinn_phong import BlinnPhong
-from mdfconv.distributions.declarations import Equivalent
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import Parameter
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import AnisotropicDistribution
-from mdfconv.distributions.declarations import (
+from mdfconv.distributions.base import (
+    AnisotropicDistribution,
     MapVariables,
     Printed,
     inverse_square_over_pi,

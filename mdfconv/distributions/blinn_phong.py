@@ -6,8 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.declarations import MapVariables, Printed, same
+from mdfconv.distributions.base import Distribution, MapVariables, Printed, same
 from mdfconv.distributions.evaluation import Array, negative_log_tail, tangent_square
 from mdfconv.distributions.parameter import Encoding, Parameter
 

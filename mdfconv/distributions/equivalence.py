@@ -15,7 +15,7 @@ Function: TypeAlias = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
-class Formula:
+class ParameterMap:
     """A formula from one distribution's parameter to another's.
 
     Parameters
@@ -33,7 +33,7 @@ class Formula:
     turns_at: float = float("inf")
 
 
-def to_root(mdf: Distribution, *, same_lobe: bool) -> tuple[Distribution, Sequence[Formula]]:
+def to_root(mdf: Distribution, *, same_lobe: bool) -> tuple[Distribution, Sequence[ParameterMap]]:
     """Return the distribution in whose parameter another one can be expressed, and how.
 
     Parameters
@@ -52,18 +52,18 @@ def to_root(mdf: Distribution, *, same_lobe: bool) -> tuple[Distribution, Sequen
     equal = mdf.equivalent
     if equal is None or (same_lobe and not equal.same_lobe):
         return mdf, ()
-    return distribution(equal.name), (Formula(equal.forward_text, equal.forward),)
+    return distribution(equal.name), (ParameterMap(equal.forward_text, equal.forward),)
 
 
-def from_root(mdf: Distribution, *, same_lobe: bool) -> Sequence[Formula]:
+def from_root(mdf: Distribution, *, same_lobe: bool) -> Sequence[ParameterMap]:
     """Return the steps from the root's parameter back, as for `to_root`."""
     equal = mdf.equivalent
     if equal is None or (same_lobe and not equal.same_lobe):
         return ()
-    return (Formula(equal.backward_text, equal.backward),)
+    return (ParameterMap(equal.backward_text, equal.backward),)
 
 
-def exact_route(source: Distribution, target: Distribution) -> Sequence[Formula] | None:
+def exact_route(source: Distribution, target: Distribution) -> Sequence[ParameterMap] | None:
     """Return the steps between two distributions that have the same lobes; None for others."""
     if source.is_same(target):
         return ()
@@ -74,7 +74,7 @@ def exact_route(source: Distribution, target: Distribution) -> Sequence[Formula]
     return (*forward, *from_root(target, same_lobe=True))
 
 
-def follow(steps: Sequence[Formula], parameter: Array) -> Array:
+def follow(steps: Sequence[ParameterMap], parameter: Array) -> Array:
     """Return what the steps make of parameters, one after the other; infinite at an end of both."""
     with np.errstate(all="ignore"):
         for step in steps:

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.declarations import MapVariables, Printed, same
+from mdfconv.distributions.base import Distribution, MapVariables, Printed, same
 from mdfconv.distributions.evaluation import Array, gauss_legendre, inverse_square
 from mdfconv.distributions.parameter import Parameter
 

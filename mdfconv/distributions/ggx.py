@@ -6,14 +6,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mdfconv.distributions.base import AnisotropicDistribution
-from mdfconv.distributions.beckmann import slope_scale
-from mdfconv.distributions.declarations import (
+from mdfconv.distributions.base import (
+    AnisotropicDistribution,
     MapVariables,
     Printed,
     inverse_square_over_pi,
     same,
 )
+from mdfconv.distributions.beckmann import slope_scale
 from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
 from mdfconv.distributions.parameter import GLOSSINESS, ROUGHNESS, Parameter
 

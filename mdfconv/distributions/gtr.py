@@ -6,13 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.declarations import Equivalent, Printed
-from mdfconv.distributions.evaluation import (
-    Array,
-    inverse_square,
-    tangent_square,
-)
+from mdfconv.distributions.base import Distribution, Equivalent, Printed
+from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
 from mdfconv.distributions.ggx import printed_cosine, printed_from_cosine, trowbridge_reitz
 from mdfconv.distributions.parameter import Parameter
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.declarations import MapVariables, Printed, same
+from mdfconv.distributions.base import Distribution, MapVariables, Printed, same
 from mdfconv.distributions.evaluation import Array, negative_log_tail, tangent_square
 from mdfconv.distributions.parameter import Parameter
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.declarations import (
+from mdfconv.distributions.base import (
+    Distribution,
     Equivalent,
     MapVariables,
     Printed,

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.declarations import Equivalent, MapVariables, Printed
+from mdfconv.distributions.base import Distribution, Equivalent, MapVariables, Printed
 from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
 from mdfconv.distributions.ggx import printed_cosine, printed_from_cosine, trowbridge_reitz
 from mdfconv.distributions.parameter import Parameter

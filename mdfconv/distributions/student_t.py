@@ -6,8 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import Distribution
-from mdfconv.distributions.declarations import Equivalent, Printed, inverse_square_over_pi, same
+from mdfconv.distributions.base import (
+    Distribution,
+    Equivalent,
+    Printed,
+    inverse_square_over_pi,
+    same,
+)
 from mdfconv.distributions.evaluation import (
     Array,
     inverse_square,

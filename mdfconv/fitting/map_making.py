@@ -11,11 +11,11 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from mdfconv.distributions import distribution
-from mdfconv.distributions.declarations import MapVariables
+from mdfconv.distributions.base import MapVariables
 from mdfconv.distributions.evaluation import Array
-from mdfconv.fitting.fit import warm_fit
 from mdfconv.fitting.maps import Map, StoredFit
 from mdfconv.fitting.metrics import metric_named
+from mdfconv.fitting.solve import warm_fit
 
 _NODES, _CHECKS, _MOST_TERMS = 32, 37, 25
 # A bend is looked for where so many halvings have not helped: where second differences of a few

@@ -4,6 +4,6 @@
 """
 
 from mdfconv.formula.languages import LANGUAGES, write_formula
-from mdfconv.formula.search import Problem, cheapest, pareto_front
+from mdfconv.formula.search import SearchProblem, cheapest, pareto_front
 
-__all__ = ["LANGUAGES", "Problem", "cheapest", "pareto_front", "write_formula"]
+__all__ = ["LANGUAGES", "SearchProblem", "cheapest", "pareto_front", "write_formula"]

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdfconv import __version__
-from mdfconv.conversion.endpoint import Endpoint
+from mdfconv.distributions.endpoint import Endpoint
 from mdfconv.distributions.parameter import number_text
 from mdfconv.formula.family import Formula
-from mdfconv.formula.search import Problem, is_glossy
+from mdfconv.formula.search import SearchProblem, is_glossy
 from mdfconv.registry import Registry
 
 # What an argument cannot be called: words of the emitted code, and of the languages. Words with
@@ -56,16 +56,16 @@ class Language(ABC):
     comment: str
 
     @abstractmethod
-    def lines(self, formula: Formula, problem: Problem) -> list[str]:
+    def lines(self, formula: Formula, problem: SearchProblem) -> list[str]:
         """Return the lines of a formula, without the comment before it."""
 
     @abstractmethod
-    def one_line(self, formula: Formula, problem: Problem) -> str:
+    def one_line(self, formula: Formula, problem: SearchProblem) -> str:
         """Return what the formula computes in a single line, for a table."""
 
 
 @dataclass(frozen=True)
-class Dialect(Language):
+class Syntax(Language):
     """How a programming language writes what the formulas need.
 
     Parameters
@@ -94,7 +94,7 @@ class Dialect(Language):
     inverse_root: str
     include: str = ""
 
-    def lines(self, formula: Formula, problem: Problem) -> list[str]:
+    def lines(self, formula: Formula, problem: SearchProblem) -> list[str]:
         """Return the lines of a function of the source's stored value."""
         argument = argument_name(problem.source.stored.name)
         return [
@@ -104,11 +104,11 @@ class Dialect(Language):
             *([self.foot] if self.foot else []),
         ]
 
-    def one_line(self, formula: Formula, problem: Problem) -> str:
+    def one_line(self, formula: Formula, problem: SearchProblem) -> str:
         """Return the statements of the function."""
         return "; ".join(self._statements(formula, problem))
 
-    def _statements(self, formula: Formula, problem: Problem) -> list[str]:
+    def _statements(self, formula: Formula, problem: SearchProblem) -> list[str]:
         constants, result = _body(formula, problem, self)
         declared = [self.declare.format(name=name, value=value) for name, value in constants]
         return [*declared, f"return {result}"]
@@ -119,13 +119,13 @@ class Latex(Language):
 
     comment = "%"
 
-    def lines(self, formula: Formula, problem: Problem) -> list[str]:
+    def lines(self, formula: Formula, problem: SearchProblem) -> list[str]:
         """Return the one line of an equation, with the range in which it holds."""
         low, high = _latex_number(problem.low), _latex_number(problem.high)
         condition = rf"{low} \le {_latex_symbol(problem.source)} \le {high}"
         return [rf"{self.one_line(formula, problem)}, \quad {condition}"]
 
-    def one_line(self, formula: Formula, problem: Problem) -> str:
+    def one_line(self, formula: Formula, problem: SearchProblem) -> str:
         """Return the equation."""
         shape = formula.shape
         symbol = _latex_symbol(problem.source)
@@ -163,7 +163,7 @@ _CLAMP = "clamp({}, {}, {})"
 LANGUAGES: Registry[Language] = Registry("language")
 LANGUAGES.add(
     "glsl",
-    Dialect(
+    Syntax(
         **_SHADER,
         number=_plain,
         clamp=_CLAMP,
@@ -173,11 +173,11 @@ LANGUAGES.add(
 )
 LANGUAGES.add(
     "hlsl",
-    Dialect(**_SHADER, number=_plain, clamp=_CLAMP, root="sqrt({})", inverse_root="rsqrt({})"),
+    Syntax(**_SHADER, number=_plain, clamp=_CLAMP, root="sqrt({})", inverse_root="rsqrt({})"),
 )
 LANGUAGES.add(
     "c",
-    Dialect(
+    Syntax(
         **_SHADER,
         number=lambda value: f"{_plain(value)}f",
         clamp="fminf(fmaxf({}, {}), {})",
@@ -188,7 +188,7 @@ LANGUAGES.add(
 )
 LANGUAGES.add(
     "python",
-    Dialect(
+    Syntax(
         comment="#",
         head="def {name}({argument}):",
         declare="{name} = {value}",
@@ -205,7 +205,7 @@ LANGUAGES.add(
 LANGUAGES.add("latex", Latex())
 
 
-def write_formula(formula: Formula, problem: Problem, language: str) -> str:
+def write_formula(formula: Formula, problem: SearchProblem, language: str) -> str:
     """Return a formula as code that can be pasted, with a comment that states what it keeps.
 
     Parameters
@@ -227,7 +227,7 @@ def write_formula(formula: Formula, problem: Problem, language: str) -> str:
     return "\n".join([*comments, *form.lines(formula, problem)])
 
 
-def function_name(problem: Problem) -> str:
+def function_name(problem: SearchProblem) -> str:
     """Return an identifier that says what is computed, and γ where it is not the usual one."""
     ends = []
     for end in (problem.target, problem.source):
@@ -260,7 +260,7 @@ def _ascii(text: str, greek: str = "{}") -> str:
     )
 
 
-def _facts(formula: Formula, problem: Problem) -> list[str]:
+def _facts(formula: Formula, problem: SearchProblem) -> list[str]:
     """Return what a reader of the code must know, in ASCII."""
     source, target = (_ascii(_end_text(end)) for end in (problem.source, problem.target))
     metric = problem.metric
@@ -284,7 +284,7 @@ def _end_text(end: Endpoint) -> str:
 
 
 def _body(
-    formula: Formula, problem: Problem, dialect: Dialect
+    formula: Formula, problem: SearchProblem, dialect: Syntax
 ) -> tuple[list[tuple[str, str]], str]:
     """Return the constants of the function and the expression of its result."""
     shape = formula.shape
@@ -318,7 +318,7 @@ def _enclosed(value: str) -> str:
     return f"({value})" if " " in value else value
 
 
-def _raised(base: str, exponent: float, dialect: Dialect, named: Callable[[str, str], str]) -> str:
+def _raised(base: str, exponent: float, dialect: Syntax, named: Callable[[str, str], str]) -> str:
     """Return the expression of a name raised to one of the family's powers."""
     square = f"{base} * {base}"
     if exponent == 4:
@@ -338,7 +338,7 @@ def _raised(base: str, exponent: float, dialect: Dialect, named: Callable[[str, 
     }[exponent]
 
 
-def _horner(coefficients: tuple[float, ...], u: str, dialect: Dialect) -> str:
+def _horner(coefficients: tuple[float, ...], u: str, dialect: Syntax) -> str:
     value = dialect.number(coefficients[-1])
     for coefficient in coefficients[-2::-1]:
         value = f"{dialect.number(coefficient)} + {u} * {_enclosed(value)}"

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mdfconv.conversion.endpoint import Endpoint
+from mdfconv.distributions.endpoint import Endpoint
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
@@ -33,7 +33,7 @@ _GAIN = 0.9
 
 
 @dataclass(frozen=True)
-class Problem:
+class SearchProblem:
     """What a formula is to compute: the fit of a pair over a range.
 
     Parameters
@@ -82,7 +82,7 @@ class Problem:
     @cached_property
     def samples(self) -> tuple[Array, Array]:
         """Return w and t of the fits, at points that crowd towards the ends of the range."""
-        from mdfconv.fitting.fit import fit
+        from mdfconv.fitting.solve import fit
 
         ends = np.log(natural(self.source, self.bounds.astype(float)))
         turn = np.cos(np.pi * np.arange(_FITS) / (_FITS - 1))
@@ -132,7 +132,7 @@ def natural(end: Endpoint, stored: Array) -> Array:
     return 1 - stored if is_glossy(end) else stored
 
 
-def cheapest(problem: Problem, tolerance: float) -> Formula:
+def cheapest(problem: SearchProblem, tolerance: float) -> Formula:
     """Return the cheapest formula whose worst relative error is at most the tolerance.
 
     Parameters
@@ -175,7 +175,7 @@ def cheapest(problem: Problem, tolerance: float) -> Formula:
     return best
 
 
-def pareto_front(problem: Problem) -> list[Formula]:
+def pareto_front(problem: SearchProblem) -> list[Formula]:
     """Return the formulas that nothing as cheap beats, each a tenth better than the one before."""
     front: list[Formula] = []
     for shape in shapes():
@@ -187,7 +187,7 @@ def pareto_front(problem: Problem) -> list[Formula]:
     return front
 
 
-def _best(problem: Problem, shape: Shape, bound: float) -> Formula | None:
+def _best(problem: SearchProblem, shape: Shape, bound: float) -> Formula | None:
     """Return the formula of a shape with nearly the smallest worst error.
 
     None if the shape does not apply, or cannot stay below the bound.

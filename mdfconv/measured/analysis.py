@@ -4,17 +4,50 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
 from mdfconv.distributions import Distribution
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.brdf_fit import BrdfFit, BrdfModel, fit_brdf
-from mdfconv.measured.directional import DirectionalSamples
 from mdfconv.measured.lobe_fit import LOSSES, LobeFit, fit_lobe
-from mdfconv.measured.ranking import rank, simplest
-from mdfconv.measured.samples import Samples
+from mdfconv.measured.samples import DirectionalSamples, Samples
+
+
+class RankedFit(Protocol):
+    """A fit whose error compares with that of others to the same samples."""
+
+    @property
+    def distribution(self) -> Distribution:
+        """The distribution."""
+
+    @property
+    def parameters(self) -> Any:
+        """What was fitted of it: as many as there are."""
+
+    @property
+    def error(self) -> float:
+        """Root mean square of the loss's residuals."""
+
+
+Fit = TypeVar("Fit", bound=RankedFit)
+
+
+def rank(fits: Sequence[Fit]) -> list[Fit]:
+    """Return fits by their error, the smallest first."""
+    return sorted(fits, key=lambda fit: fit.error)
+
+
+def simplest(fits: Sequence[Fit], tolerance: float) -> Fit:
+    """Return the cheapest of fits whose error is within a relative tolerance of the best.
+
+    Cheapest has the fewest parameters, then the fewest operations per evaluation.
+    """
+    best = min(fit.error for fit in fits)
+    good = [fit for fit in fits if fit.error <= (1 + tolerance) * best]
+    return min(good, key=lambda fit: (len(fit.parameters), fit.distribution.operations))
+
 
 Measurements: TypeAlias = Samples | DirectionalSamples
 # Beyond it the masking that a slice at θ_d = 0 leaves out is large, degrees.

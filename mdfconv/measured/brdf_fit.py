@@ -13,14 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from mdfconv.brdf.directions import polar_angle
 from mdfconv.brdf.fresnel import dielectric, schlick_fresnel
-from mdfconv.brdf.masking import v_cavity
+from mdfconv.brdf.microfacet import polar_angle, v_cavity
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.directional import DirectionalSamples
 from mdfconv.measured.lobe_fit import half_width_logarithms
 from mdfconv.measured.projection import (
     Projection,
@@ -30,6 +28,7 @@ from mdfconv.measured.projection import (
     standard_deviations,
     upper_triangle,
 )
+from mdfconv.measured.samples import DirectionalSamples
 from mdfconv.registry import unknown_name
 
 LOSSES = ("linear", "log", "cosine")
@@ -172,7 +171,7 @@ def fit_brdf(
     options = options or BrdfModel()
     if target.second_parameter and gamma is not None:
         target = target.with_gamma(gamma)
-    problem = _Problem(_Geometry(data, options), target, options, free=gamma is None)
+    problem = _DirectionalProblem(_Geometry(data, options), target, options, free=gamma is None)
     random = np.random.default_rng(_SEED)
     some = problem.part(random, _SOME)
     starts = some.part(random, _SCANNED).starts()
@@ -256,7 +255,7 @@ class _Geometry:
         return some
 
 
-class _Problem:
+class _DirectionalProblem:
     """The projected problem: residuals and slopes in ln p, ln γ and F₀."""
 
     def __init__(
@@ -319,21 +318,25 @@ class _Problem:
         if (values <= 0).all():
             raise MdfconvError("no value is positive: there is no lobe to fit")
 
-    def part(self, random: np.random.Generator, count: int) -> _Problem:
+    def part(self, random: np.random.Generator, count: int) -> _DirectionalProblem:
         """Return the problem of some of the samples, itself if there are not more."""
         if self._size <= count:
             return self
         index = np.sort(random.choice(self._size, count, replace=False))
         free = self._gamma_range is not None
-        return _Problem(self._geometry.part(index), self._target, self._options, free=free)
+        return _DirectionalProblem(
+            self._geometry.part(index), self._target, self._options, free=free
+        )
 
-    def reweighted(self, point: Array) -> _Problem:
+    def reweighted(self, point: Array) -> _DirectionalProblem:
         """Return the problem in which what is far off at a point counts less."""
         residual = np.abs(self.residual(point).reshape(self._size, -1)).max(axis=1)
         spread = _MEDIANS * float(np.median(residual)) or 1.0
         weight = np.minimum(1, _HUBER * spread / np.maximum(residual, 1e-300))
         free = self._gamma_range is not None
-        return _Problem(self._geometry, self._target, self._options, free=free, weight=weight)
+        return _DirectionalProblem(
+            self._geometry, self._target, self._options, free=free, weight=weight
+        )
 
     def starts(self) -> list[Array]:
         """Return the best point of a scan over p for each γ of a grid and each F₀."""

@@ -114,13 +114,13 @@ def fit_lobe(
     MdfconvError
         If there are fewer samples than unknowns, nothing to fit, or γ is illegal.
     """
-    problem = _Problem(data, target, loss, gamma)
+    problem = _SliceProblem(data, target, loss, gamma)
     solutions = [problem.refine(start) for start in problem.starts()]
     _, point = min(solutions, key=lambda solution: solution[0])
     return problem.report(point)
 
 
-class _Problem:
+class _SliceProblem:
     """The projected problem: residuals and slopes in the logarithms of p (and γ)."""
 
     def __init__(self, data: Samples, target: Distribution, loss: str, gamma: float | None) -> None:

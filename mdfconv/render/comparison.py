@@ -8,20 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.brdf.directions import Brdf
-from mdfconv.brdf.fresnel import schlick_fresnel
-from mdfconv.brdf.materials import material
-from mdfconv.brdf.microsurface import Microsurface
+from mdfconv.brdf.fresnel import material, schlick_fresnel
+from mdfconv.brdf.microfacet import Brdf, Microsurface
 from mdfconv.brdf.reflection import BRDFS
 from mdfconv.conversion import convert, method_named
-from mdfconv.conversion.endpoint import Endpoint, one_parameter_endpoint
 from mdfconv.distributions import Distribution
+from mdfconv.distributions.endpoint import Endpoint, one_parameter_endpoint
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
-from mdfconv.fitting.metrics.display import srgb
+from mdfconv.fitting.metrics.base import srgb
 from mdfconv.output.records import rounded_rows
-from mdfconv.paper.error_curves import DRAWN, PAPER_SETS, lobe_extent
 from mdfconv.render.sphere import (
     LIGHTS,
     MARGIN,
@@ -31,6 +28,7 @@ from mdfconv.render.sphere import (
     highlight_extent,
     radiance,
 )
+from mdfconv.studies.error_curves import DRAWN, PAPER_SETS, lobe_extent
 
 _SECTION_POINTS = 401
 _SIZES = (16, 4096)  # pixels a side: from where the sphere shows up to what memory holds
@@ -95,7 +93,7 @@ class Scene:
 
 
 @dataclass(frozen=True)
-class Rule:
+class ConversionRule:
     """One way to convert the parameters: a row of the contact sheet.
 
     Parameters
@@ -117,12 +115,12 @@ class Rule:
         return f"{self.method} ({_KEPT[self.method]})" if self.method in _KEPT else self.method
 
 
-def default_rules(exposure: float) -> list[Rule]:
+def default_rules(exposure: float) -> list[ConversionRule]:
     """Return the paper's conversion (shape), and the fits that keep the light and the picture."""
     return [
-        Rule("closed-form", metric_named("unit")),
-        Rule("fit", metric_named("energy")),
-        Rule("fit", metric_named(f"display:{exposure}")),
+        ConversionRule("closed-form", metric_named("unit")),
+        ConversionRule("fit", metric_named("energy")),
+        ConversionRule("fit", metric_named(f"display:{exposure}")),
     ]
 
 
@@ -260,7 +258,7 @@ class _Surface:
 
 def compare(
     value: float,
-    rules: Sequence[Rule],
+    rules: Sequence[ConversionRule],
     scene: Scene,
     source: str | Endpoint = REFERENCE,
     targets: Sequence[str | Endpoint] = DRAWN,

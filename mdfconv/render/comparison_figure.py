@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdfconv.brdf.materials import material
+from mdfconv.brdf.fresnel import material
 from mdfconv.distributions.evaluation import Array
-from mdfconv.fitting.metrics.display import srgb
+from mdfconv.fitting.metrics.base import srgb
 from mdfconv.output.figures import encoded, line_style, new_figure, place_pixels
 from mdfconv.render.comparison import Comparison, Rendering
 from mdfconv.render.sphere import MARGIN, Frame

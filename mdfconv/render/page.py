@@ -11,7 +11,7 @@ from importlib.resources import files
 from typing import Any
 
 from mdfconv import __version__
-from mdfconv.conversion.endpoint import Endpoint
+from mdfconv.distributions.endpoint import Endpoint
 from mdfconv.errors import MdfconvError
 from mdfconv.output.files import file_bytes
 from mdfconv.render.comparison_figure import BACKGROUND

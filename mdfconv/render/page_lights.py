@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.brdf.directions import direction, half_vector
+from mdfconv.brdf.microfacet import direction, half_vector
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, gauss_panels
-from mdfconv.fitting.metrics.display import srgb
+from mdfconv.fitting.metrics.base import srgb
 from mdfconv.render.comparison import Scene
 from mdfconv.render.page_tables import DEGREE, grid, packed, rounded
 from mdfconv.render.sphere import LIGHTS, VIEW, Lights, cross_section, radiance

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from mdfconv.conversion import convert
-from mdfconv.conversion.endpoint import DEFAULT_ENCODING, Endpoint, encodings_of, endpoint
-from mdfconv.conversion.remaining_error import remaining_error
+from mdfconv.conversion.explanation import remaining_error
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.dialects import Specular, dialects_of
+from mdfconv.distributions.endpoint import DEFAULT_ENCODING, Endpoint, encodings_of, endpoint
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.light.lobe_spectrum import LobeSpectrum

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.brdf.directions import Brdf, frames, half_vector, unit
+from mdfconv.brdf.microfacet import Brdf, frames, half_vector, unit
 from mdfconv.distributions.evaluation import Array
 from mdfconv.registry import Registry
 

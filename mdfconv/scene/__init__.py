@@ -1,12 +1,12 @@
 """Scene files: material libraries and roughness textures."""
 
-from mdfconv.scene.gltf import convert_gltf
-from mdfconv.scene.gltf_images import GltfTextures
-from mdfconv.scene.mitsuba import convert_mitsuba
-from mdfconv.scene.mtl import convert_mtl
-from mdfconv.scene.texture import convert_texture, convert_texture_file
-from mdfconv.scene.texture_map import TextureReport
-from mdfconv.scene.texture_rule import TextureRule
+from mdfconv.scene.gltf.asset import convert_gltf
+from mdfconv.scene.gltf.images import GltfTextures
+from mdfconv.scene.mitsuba.convert import convert_mitsuba
+from mdfconv.scene.mtl.library import convert_mtl
+from mdfconv.scene.texture.convert import convert_texture, convert_texture_file
+from mdfconv.scene.texture.rule import TextureRule
+from mdfconv.scene.texture.texel_map import TextureReport
 
 __all__ = [
     "GltfTextures",

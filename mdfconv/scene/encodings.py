@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.conversion.endpoint import endpoint
 from mdfconv.distributions import list_distributions
 from mdfconv.distributions.dialects import Dialect, Specular, dialects_of
+from mdfconv.distributions.endpoint import endpoint
 from mdfconv.fitting.metrics import Metric
 from mdfconv.scene.shininess import error_of, importer_roughness
 

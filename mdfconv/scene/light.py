@@ -11,10 +11,11 @@ import numpy as np
 
 from mdfconv.distributions import distribution
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.fit import fit
 from mdfconv.fitting.metrics import metric_named
-from mdfconv.fitting.metrics.light import Light
+from mdfconv.fitting.metrics.light import LightMetric
+from mdfconv.fitting.solve import fit
 from mdfconv.light.spectrum import FIRST_OF_LAW, Spectrum, spectrum_of_file
+from mdfconv.output.figures import PAGE, encoded, new_figure
 
 SOURCE, TARGET = "beckmann", "ggx"
 # What the light's own answer is shown beside.
@@ -81,7 +82,7 @@ def light_report(path: str | Path, m_b: Sequence[float]) -> LightReport:
     source, target = distribution(SOURCE), distribution(TARGET)
     parameter = np.array([source.parameter.check_one(value, SOURCE) for value in m_b])
     spectrum = spectrum_of_file(path)
-    metrics = {"light": Light(spectrum)} | {name: metric_named(name) for name in METRICS}
+    metrics = {"light": LightMetric(spectrum)} | {name: metric_named(name) for name in METRICS}
     columns = {"m_b": parameter}
     for name, metric in metrics.items():
         with np.errstate(all="ignore"):
@@ -94,3 +95,38 @@ def light_report(path: str | Path, m_b: Sequence[float]) -> LightReport:
     rows = zip(*(columns[name].tolist() for name in shown), strict=True)
     softness = float(np.clip((spectrum.exponent - SUN) / (OVERCAST - SUN), 0, 1))
     return LightReport(spectrum, softness, [dict(zip(shown, row, strict=True)) for row in rows])
+
+
+_GUIDES = ((0.0, "a sun: l⁰", ":"), (2.0, "nature: l⁻²", "--"))
+
+
+def draw_spectrum(spectrum: Spectrum, title: str, dpi: int = 150) -> bytes:
+    """Return a PNG of C_l over l, the power law through it, and those of a sun and of nature.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        The light.
+    title : str
+        What it is.
+    dpi : int
+        Resolution.
+    """
+    figure = new_figure(*PAGE)
+    panel = figure.subplots()
+    degree = np.arange(1, spectrum.highest + 1)
+    power = spectrum.power[1:]
+    panel.plot(degree, power, color="#0072B2", linewidth=0.9, label="the light")
+    beyond = np.geomspace(FIRST_OF_LAW, 8 * spectrum.highest, 100) + 0.5
+    law = f"power law: $l^{{{-spectrum.exponent:.2f}}}$"
+    panel.plot(beyond - 0.5, spectrum.law(beyond), color="#D55E00", label=law)
+    start = spectrum.law(np.array([FIRST_OF_LAW + 0.5]))[0]
+    for exponent, label, dashes in _GUIDES:
+        guide = start * (degree / FIRST_OF_LAW) ** -exponent
+        panel.plot(degree, guide, color="0.5", linestyle=dashes, linewidth=1, label=label)
+    measured = f"measured to l = {spectrum.highest}"
+    panel.axvline(spectrum.highest, color="0.7", linewidth=0.8, label=measured)
+    panel.set(xscale="log", yscale="log", xlabel="degree l", title=title)
+    panel.set_ylabel("C_l (4π at l = 0)")
+    panel.legend()
+    return encoded(figure, dpi=dpi)

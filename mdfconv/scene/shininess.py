@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdfconv.conversion import convert
-from mdfconv.conversion.endpoint import endpoints
-from mdfconv.conversion.remaining_error import remaining_error
+from mdfconv.conversion.explanation import remaining_error
 from mdfconv.distributions.dialects import DIALECTS
+from mdfconv.distributions.endpoint import endpoints
 from mdfconv.distributions.evaluation import Array
-from mdfconv.fitting.interpolation import errors_of_many
 from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.solve import errors_of_many
 
 SHININESS, ROUGHNESS = "blinn-phong", "ggx:roughness"
 # Pr at these is 1 − 2e-7 and 4e-5: no library means anything beyond.

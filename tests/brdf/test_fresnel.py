@@ -16,9 +16,9 @@ from mdfconv.brdf.fresnel import (
     schlick_fresnel,
     smoothie_fresnel,
 )
-from mdfconv.brdf.fresnel_fit import fit, rescaled
 from mdfconv.errors import MdfconvError
-from mdfconv.reports.fresnel_page import error_rows, fresnel_page
+from mdfconv.studies.fresnel import fit, rescaled
+from mdfconv.studies.report.fresnel_page import error_rows, fresnel_page
 from tests.cli.runner import run
 
 mp.mp.dps = 60

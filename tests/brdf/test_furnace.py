@@ -7,12 +7,16 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from mdfconv.brdf.directions import direction
-from mdfconv.brdf.furnace import directional_albedo, sampled_albedo
-from mdfconv.brdf.models import furnace_model, list_models
-from mdfconv.brdf.phong import arvo, mallett_yuksel
-from mdfconv.brdf.smoothie import energy_response
-from mdfconv.reports.furnace_page import furnace_page
+from mdfconv.brdf.microfacet import direction
+from mdfconv.brdf.reflection import arvo, mallett_yuksel
+from mdfconv.studies.furnace import (
+    directional_albedo,
+    energy_response,
+    furnace_model,
+    list_models,
+    sampled_albedo,
+)
+from mdfconv.studies.report.furnace_page import furnace_page
 from tests.cli.runner import run
 
 COSINES = np.array([0.0, 1e-6, 1e-3, 0.03, 0.2, 0.5, 0.77, 0.99, 1.0])

@@ -6,12 +6,15 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from mdfconv.brdf.directions import direction, dot, half_vector
 from mdfconv.brdf.fresnel import lossless
-from mdfconv.brdf.masking import MASKINGS, v_cavity
-from mdfconv.brdf.microsurface import Microsurface
-from mdfconv.brdf.phong import modified
-from mdfconv.brdf.reflection import ashikhmin_shirley, microfacet, smoothie, smoothie_approx
+from mdfconv.brdf.microfacet import MASKINGS, Microsurface, direction, dot, half_vector, v_cavity
+from mdfconv.brdf.reflection import (
+    ashikhmin_shirley,
+    microfacet,
+    modified,
+    smoothie,
+    smoothie_approx,
+)
 from mdfconv.distributions import distribution, list_distributions
 from mdfconv.errors import MdfconvError
 from tests import oracles

@@ -3,13 +3,9 @@
 import numpy as np
 import pytest
 
-from mdfconv.brdf.directions import direction, frames
-from mdfconv.brdf.fresnel import lossless
-from mdfconv.brdf.masking import kelemen_szirmay_kalos
-from mdfconv.brdf.materials import METALS, PLASTICS, list_materials, material
-from mdfconv.brdf.microsurface import Microsurface
-from mdfconv.brdf.phong import modified
-from mdfconv.brdf.reflection import BRDFS, microfacet
+from mdfconv.brdf.fresnel import METALS, PLASTICS, list_materials, lossless, material
+from mdfconv.brdf.microfacet import Microsurface, direction, frames, kelemen_szirmay_kalos
+from mdfconv.brdf.reflection import BRDFS, microfacet, modified
 from mdfconv.distributions import distribution
 from mdfconv.errors import MdfconvError
 

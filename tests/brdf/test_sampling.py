@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from mdfconv.brdf.directions import direction, dot, frames, reflect, unit
-from mdfconv.brdf.microsurface import Microsurface
-from mdfconv.brdf.sampling import cosine_lobe, cosine_lobe_density, reflected_density
+from mdfconv.brdf.microfacet import Microsurface, direction, dot, frames, reflect, unit
 from mdfconv.distributions import distribution
 from mdfconv.errors import MdfconvError
+from mdfconv.studies.furnace import cosine_lobe, cosine_lobe_density, reflected_density
 
 COUNT = 200_000
 BINS = (24, 48)

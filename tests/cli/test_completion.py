@@ -9,10 +9,10 @@ import typer
 
 import mdfconv
 from mdfconv.cli import app, completion
-from mdfconv.conversion.endpoint import encodings_of
+from mdfconv.distributions.endpoint import encodings_of
 from mdfconv.fitting.metrics import list_metrics
 from mdfconv.formula import LANGUAGES
-from mdfconv.scene.texture_rule import TextureRule
+from mdfconv.scene.texture.rule import TextureRule
 
 # Completion is bound to the name of the installed program, which `python -m` is not.
 PROGRAM = "import sys; sys.argv[0] = 'mdfconv'; from mdfconv.cli import main; main()"

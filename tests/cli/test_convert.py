@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mdfconv
-from mdfconv.conversion.endpoint import endpoint
+from mdfconv.distributions.endpoint import endpoint
 from tests.cli.runner import COMMAND, run, run_on_terminal
 
 

@@ -23,8 +23,8 @@ from PIL import Image
 import mdfconv
 from mdfconv.cli import app
 from mdfconv.output import files as output_files
-from mdfconv.reports import build as report
-from mdfconv.reports.artefact import Artefact
+from mdfconv.studies.report import build as report
+from mdfconv.studies.report.artefact import Artefact
 from tests.cli.runner import run_here as run
 from tests.light.maps import room, write_map
 
@@ -125,11 +125,11 @@ def _here(tmp_path, monkeypatch):
     monkeypatch.setattr(report, "FILES", ("a.md", "README.md"))
     monkeypatch.setattr(Figure, "savefig", lambda figure, file, **_: file.write(b"drawn"))
     monkeypatch.setattr("mdfconv.render.page.comparison_page", lambda *_: b"page")
-    monkeypatch.setattr("mdfconv.benchmark.measure.measure", lambda *_: None)
-    monkeypatch.setattr("mdfconv.benchmark.figure.draw", lambda _: b"drawn")
+    monkeypatch.setattr("mdfconv.studies.bench.measure.measure", lambda *_: None)
+    monkeypatch.setattr("mdfconv.studies.bench.figure.draw", lambda _: b"drawn")
     for name in ("_csv", "_json"):
         monkeypatch.setattr(f"mdfconv.cli.bench_command.{name}", lambda _: "measured")
-    monkeypatch.setattr("mdfconv.benchmark.stability.audit", lambda *_: [])
+    monkeypatch.setattr("mdfconv.studies.stability.audit", lambda *_: [])
     Path("a.mtl").write_text("newmtl a\nNs 10\nmap_Ns x.png\n")
     Path("a.gltf").write_text(
         '{"asset": {"version": "2.0"}, "images": [{"uri": "orm.png"}], "textures": [{"source": 0}],'

@@ -60,7 +60,7 @@ def test_without_standard_output_nothing_is_answered(arguments, redirection):
     assert err.count("\n") == (0 if "2>" in redirection else 1)
 
 
-@pytest.mark.parametrize("module", ["typer", "numpy", "mdfconv.paper.table2"])
+@pytest.mark.parametrize("module", ["typer", "numpy", "mdfconv.studies.table2"])
 def test_ctrl_c_during_the_imports(module, tmp_path):
     (tmp_path / "interrupt.py").write_text(
         "import signal, sys\n"

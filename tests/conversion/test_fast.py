@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 import mdfconv
 from mdfconv.fitting import maps
-from mdfconv.fitting.fit import cold_fit
 from mdfconv.fitting.metrics import list_metrics, metric_named
-from mdfconv.fitting.metrics.display import Display
+from mdfconv.fitting.metrics.base import Display
+from mdfconv.fitting.solve import cold_fit
 from tests import generate_fast
 from tests.cli.runner import run
 

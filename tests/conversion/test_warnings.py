@@ -7,7 +7,7 @@ import pytest
 
 import mdfconv
 from mdfconv.fitting.metrics import metric_named
-from mdfconv.paper.table2 import angle_limit, fit_table
+from mdfconv.studies.table2 import angle_limit, fit_table
 
 TURNED = r"outside the paper's sweep: .* m_B from 0.0044 to 0.4473; beyond 0.845 .* turns around"
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import mdfconv
-from mdfconv.conversion.endpoint import encodings_of, endpoint
 from mdfconv.distributions.dialects import DIALECTS, Specular
+from mdfconv.distributions.endpoint import encodings_of, endpoint
 from mdfconv.errors import MdfconvError
 
 EXPONENTS = np.geomspace(0.3, 3e4, 20).tolist()

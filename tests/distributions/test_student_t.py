@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import mdfconv
-from mdfconv.fitting.fit import fit
 from mdfconv.fitting.free_gamma import fit_free_gamma
 from mdfconv.fitting.metrics import list_metrics, metric_named
+from mdfconv.fitting.solve import fit
 
 STUDENT = mdfconv.distribution("student-t")
 BETA = np.linspace(0, np.pi / 2, 200)

@@ -6,9 +6,8 @@ import pytest
 from scipy.special import eval_legendre, roots_legendre
 
 import mdfconv
-from mdfconv.fitting.fit import fit
-from mdfconv.fitting.metrics.energy import Energy
-from mdfconv.fitting.metrics.environment import Environment
+from mdfconv.fitting.metrics.base import Energy, Environment
+from mdfconv.fitting.solve import fit
 
 # Beckmann → GGX is the root of 2 a e^a E₁(a) = 1, as α = √a m.
 CONSTANT = 0.7810619641455308

@@ -9,12 +9,10 @@ import pytest
 import mdfconv
 from mdfconv.distributions import one_parameter_distributions
 from mdfconv.fitting import maps
-from mdfconv.fitting.fit import cold_fit, fit
 from mdfconv.fitting.metrics import list_metrics, metric_named
-from mdfconv.fitting.metrics.display import Display
-from mdfconv.fitting.metrics.energy import Energy
-from mdfconv.fitting.metrics.unit import Unit
+from mdfconv.fitting.metrics.base import Display, Energy, Unit
 from mdfconv.fitting.quadrature import UniformSamples
+from mdfconv.fitting.solve import cold_fit, fit
 from tests import oracles
 from tests.fitting import brute_force
 

@@ -5,11 +5,9 @@ import pytest
 from scipy import optimize
 
 import mdfconv
-from mdfconv.fitting.free_gamma import fit_free_gamma
-from mdfconv.fitting.least_squares import least_squares
+from mdfconv.fitting.free_gamma import fit_free_gamma, least_squares
 from mdfconv.fitting.metrics import metric_named
-from mdfconv.fitting.metrics.energy import Energy
-from mdfconv.fitting.metrics.unit import Unit
+from mdfconv.fitting.metrics.base import Energy, Unit
 
 GTR = mdfconv.distribution("gtr")
 TARGETS = ("gtr", "student-t")
@@ -48,7 +46,7 @@ def test_no_pair_nearby_or_far_is_better(metric, target):
     for row, value in enumerate(values):
         near = found.gamma[row] * np.array([0.98, 0.999, 1, 1.001, 1.02])
         for gamma in np.clip(np.append(near, np.geomspace(low, high, 9)), low, high):
-            best = mdfconv.fitting.fit.cold_fit(
+            best = mdfconv.fitting.solve.cold_fit(
                 source, np.array([value]), entry.with_gamma(gamma), metric
             )
             if not np.isnan(best.distance[0]):

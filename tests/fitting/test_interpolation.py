@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import mdfconv
-from mdfconv.fitting.fit import fit
-from mdfconv.fitting.interpolation import WORTH_IT, interpolated
 from mdfconv.fitting.metrics import metric_named
+from mdfconv.fitting.solve import WORTH_IT, fit, interpolated
 
 RANDOM = np.random.default_rng(9)
 

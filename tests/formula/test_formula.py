@@ -10,14 +10,14 @@ import subprocess
 import numpy as np
 import pytest
 
-from mdfconv.conversion.endpoint import Endpoint, encodings_of, endpoint, endpoints
 from mdfconv.distributions import list_distributions, one_parameter_distributions
 from mdfconv.distributions.dialects import DIALECTS, Specular
+from mdfconv.distributions.endpoint import Endpoint, encodings_of, endpoint, endpoints
 from mdfconv.distributions.parameter import Encoding, Parameter
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.fit import fit
 from mdfconv.fitting.metrics import metric_named
-from mdfconv.formula import LANGUAGES, Problem, cheapest, pareto_front, write_formula
+from mdfconv.fitting.solve import fit
+from mdfconv.formula import LANGUAGES, SearchProblem, cheapest, pareto_front, write_formula
 from mdfconv.formula.family import Formula, Shape
 from mdfconv.formula.languages import argument_name
 from mdfconv.formula.search import is_glossy
@@ -40,7 +40,7 @@ CASES = [
 @pytest.fixture(scope="module", params=CASES, ids=lambda case: f"{case[0]}-{case[1]}")
 def solved(request):
     source, target, metric, low, high, tolerance = request.param
-    problem = Problem(endpoint(source), endpoint(target), metric_named(metric), low, high)
+    problem = SearchProblem(endpoint(source), endpoint(target), metric_named(metric), low, high)
     return problem, cheapest(problem, tolerance), tolerance
 
 
@@ -207,7 +207,7 @@ def test_operations_are_those_of_the_code(solved):
 
 @pytest.fixture(scope="module")
 def simple():
-    problem = Problem(*endpoints("blinn-phong", "ggx"), metric_named("energy"), 1, 1e4)
+    problem = SearchProblem(*endpoints("blinn-phong", "ggx"), metric_named("energy"), 1, 1e4)
     return problem, cheapest(problem, 0.1)
 
 
@@ -221,7 +221,7 @@ def test_a_constant_has_nothing_to_clamp(simple):
 
 def test_the_comment_spells_the_metrics_setting(simple):
     problem, formula = simple
-    exposed = Problem(problem.source, problem.target, metric_named("display:4"), 1, 1e4)
+    exposed = SearchProblem(problem.source, problem.target, metric_named("display:4"), 1, 1e4)
     assert "under the display:4 metric: keeps the picture" in write_formula(formula, exposed, "c")
 
 
@@ -242,7 +242,7 @@ def stored_as(name, **options):
 )  # fmt: skip
 def test_any_name_of_a_parameter_is_valid_code(name, tmp_path):
     # Of all shapes the one that needs most names: 1 − w⁴ under a root.
-    problem = Problem(stored_as(name), endpoint("beckmann"), metric_named("unit"), 0.01, 0.8)
+    problem = SearchProblem(stored_as(name), endpoint("beckmann"), metric_named("unit"), 0.01, 0.8)
     shape = Shape(variable=4.0, factor=1.0, outer=0.5, numerator=2, denominator=2)
     formula = Formula(shape, (1.0, 0.5), (0.25, 0.125), 0.1)
     values = np.linspace(0.1, 0.8, 5)
@@ -284,7 +284,7 @@ def test_a_glossiness_is_known_by_what_is_declared(simple):
 )
 def test_a_second_parameter_is_in_the_name_if_it_is_not_the_usual(gamma, name):
     source, target = endpoints("beckmann", "gtr", gamma)
-    problem = Problem(source, target, metric_named("unit"), 0.01, 0.5)
+    problem = SearchProblem(source, target, metric_named("unit"), 0.01, 0.5)
     formula = cheapest(problem, 0.02)
     codes = {language: write_formula(formula, problem, language) for language in LANGUAGES.names}
     assert function_name(codes["c"]) == name
@@ -298,14 +298,16 @@ def test_a_second_parameter_is_in_the_name_if_it_is_not_the_usual(gamma, name):
 
 def test_two_values_of_gamma_are_two_distributions():
     (first,), (second,) = (endpoints("gtr", "gtr", gamma)[:1] for gamma in (2.0, 3.0))
-    problem = Problem(first, second, metric_named("unit"), 0.01, 0.5)
+    problem = SearchProblem(first, second, metric_named("unit"), 0.01, 0.5)
     assert cheapest(problem, 0.05).error <= 0.05
     with pytest.raises(MdfconvError, match="two distributions"):
-        Problem(second, second, metric_named("unit"), 0.01, 0.5)
+        SearchProblem(second, second, metric_named("unit"), 0.01, 0.5)
 
 
 def test_no_formula_of_the_front_is_beaten():
-    problem = Problem(endpoint("blinn-phong"), endpoint("ggx"), metric_named("energy"), 1, 1e4)
+    problem = SearchProblem(
+        endpoint("blinn-phong"), endpoint("ggx"), metric_named("energy"), 1, 1e4
+    )
     front = pareto_front(problem)
     prices = [formula.shape.operations for formula in front]
     errors = [formula.error for formula in front]
@@ -321,7 +323,9 @@ def test_coefficients_are_nearly_minimax():
     """A polynomial is compared with the exact minimax one, from linear programming."""
     from scipy.optimize import linprog
 
-    problem = Problem(endpoint("beckmann"), endpoint("gauss"), metric_named("energy"), 0.01, 0.7)
+    problem = SearchProblem(
+        endpoint("beckmann"), endpoint("gauss"), metric_named("energy"), 0.01, 0.7
+    )
     w, t = problem.samples
     front = {f.shape: f for f in pareto_front(problem)}
     shape, formula = next(
@@ -340,13 +344,13 @@ def test_coefficients_are_nearly_minimax():
     [("ggx", "blinn-phong", 0.01, 0.1), ("smoothie", "beckmann", 0.001, 0.01)],
 )
 def test_nearly_exact_shapes_do_not_break_the_search(source, target, low, high):
-    problem = Problem(endpoint(source), endpoint(target), metric_named("unit"), low, high)
+    problem = SearchProblem(endpoint(source), endpoint(target), metric_named("unit"), low, high)
     front = pareto_front(problem)
     assert front[-1].error < 1e-6
 
 
 def test_tolerances_that_cannot_be_met_say_what_can():
-    problem = Problem(endpoint("beckmann"), endpoint("ggx"), metric_named("unit"), 0.01, 1)
+    problem = SearchProblem(endpoint("beckmann"), endpoint("ggx"), metric_named("unit"), 0.01, 1)
     with pytest.raises(MdfconvError, match=r"no formula is within 6e-08 in float32; the most acc"):
         cheapest(problem, 6e-8)
     for bad in (0.0, -1.0, math.nan):
@@ -431,7 +435,7 @@ def test_every_form_is_a_source(name):
     """Over its whole range, of which an end can be 0 or 1."""
     source, target = endpoint(name), endpoint("gauss")
     low, high = source.stored.typical
-    problem = Problem(source, target, metric_named("unit"), low, high)
+    problem = SearchProblem(source, target, metric_named("unit"), low, high)
     code = {}
     exec(write_formula(cheapest(problem, 0.1), problem, "python"), code)
     stored = np.geomspace(low, high, 50).clip(low, high)
@@ -455,7 +459,7 @@ def test_to_a_clamped_0_there_is_no_formula(name):
     metric = metric_named("energy")
 
     def answer(low, high):
-        return cheapest(Problem(source, target, metric, low, high), 0.1).error
+        return cheapest(SearchProblem(source, target, metric, low, high), 0.1).error
 
     with pytest.raises(MdfconvError, match=r"has no answer in .* narrow the range") as refusal:
         answer(1e-3, 0.5)

@@ -6,9 +6,9 @@ from scipy.special import eval_legendre, sph_harm_y
 
 import mdfconv
 from mdfconv.distributions import one_parameter_distributions
-from mdfconv.fitting.fit import fit
 from mdfconv.fitting.metrics import metric_named
-from mdfconv.fitting.metrics.light import Light
+from mdfconv.fitting.metrics.light import LightMetric
+from mdfconv.fitting.solve import fit
 from mdfconv.light.lobe_spectrum import LobeSpectrum
 from mdfconv.light.spectrum import Spectrum, spectrum_of
 from tests.light.maps import directions, room
@@ -110,7 +110,7 @@ def test_a_mirror_keeps_all_and_a_slope_is_one(name):
 def test_the_sum_is_the_integral(name, spectrum, metric, tolerance):
     source, target = mdfconv.distribution("beckmann"), mdfconv.distribution(name)
     parameter = np.array([1e-8, 1e-3, 0.02, 0.1, 0.4, 0.7])
-    got = fit(source, parameter, target, Light(spectrum)).parameter
+    got = fit(source, parameter, target, LightMetric(spectrum)).parameter
     wanted = fit(source, parameter, target, metric_named(metric)).parameter
     np.testing.assert_allclose(got, wanted, rtol=tolerance)
 
@@ -136,7 +136,7 @@ def test_two_halves_of_a_sphere():
 def test_mirrors_convert_alike(name):
     source, target = mdfconv.distribution("beckmann"), mdfconv.distribution(name)
     given_ = np.array([1e-7, 1e-9, 1e-12, 1e-15])
-    light = Light(Spectrum((DEGREES + 0.5) ** -2.8))
+    light = LightMetric(Spectrum((DEGREES + 0.5) ** -2.8))
     tangent = target.half_tangent(fit(source, given_, target, light).parameter)
     np.testing.assert_allclose(tangent / given_, tangent[0] / given_[0], rtol=1e-4)
 
@@ -146,7 +146,7 @@ def test_the_roughest_lobes_are_resolved():
     # A ring at the horizon reflects everything to the opposite direction: k_l = P_l(−1).
     ring = lobes(mdfconv.distribution("beckmann"), np.array([[1e4]]))[0, :8]
     np.testing.assert_allclose(ring, (-1.0) ** np.arange(1, 9), atol=1e-3)
-    light = Light(Spectrum((DEGREES[:64] + 0.5) ** -2.8))
+    light = LightMetric(Spectrum((DEGREES[:64] + 0.5) ** -2.8))
     ends = mdfconv.distribution("ggx"), mdfconv.distribution("beckmann")
     found = fit(ends[0], np.array([0.85, 0.9, 0.99]), ends[1], light).parameter
     assert (np.diff(found) > 0).all()

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import mdfconv
-from mdfconv.brdf.microsurface import Microsurface
+from mdfconv.brdf.microfacet import Microsurface
 from mdfconv.distributions import one_parameter_distributions
 from mdfconv.errors import MdfconvError
+from mdfconv.measured.analysis import rank
 from mdfconv.measured.brdf_fit import BrdfModel, fit_brdf
-from mdfconv.measured.directional import directional_samples
-from mdfconv.measured.ranking import rank
+from mdfconv.measured.samples import directional_samples
 
 INCIDENCES = np.radians([5, 15, 25, 35, 45, 55, 62, 68])
 NAMES = [mdf.name for mdf in one_parameter_distributions()]

@@ -6,9 +6,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.directional import DirectionalSamples
 from mdfconv.measured.readers import ReadOptions, read
 from mdfconv.measured.readers.merl import read_merl_directional
+from mdfconv.measured.samples import DirectionalSamples
 from tests.measured.scans import grid, measured, merl_bytes, rows, tensor_bytes
 from tests.measured.test_readers import alta, fred, zemax
 

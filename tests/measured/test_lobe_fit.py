@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import curve_fit
 
 import mdfconv
+from mdfconv.measured.analysis import rank, simplest
 from mdfconv.measured.lobe_fit import fit_lobe, foreshortening
-from mdfconv.measured.ranking import rank, simplest
 from mdfconv.measured.samples import Samples
 
 BETA = np.radians(np.arange(0, 88, 1.5))

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.directional import DirectionalSamples
 from mdfconv.measured.readers import ReadOptions, list_readers, read
 from mdfconv.measured.readers.merl import read_merl, read_merl_directional
-from mdfconv.measured.samples import Samples
+from mdfconv.measured.samples import DirectionalSamples, Samples
 from tests.cli.runner import run
 from tests.measured.scans import (
     ggx,

@@ -8,14 +8,13 @@ import pytest
 from PIL import Image
 
 from mdfconv.brdf.fresnel import schlick_fresnel
-from mdfconv.brdf.microsurface import Microsurface
+from mdfconv.brdf.microfacet import Microsurface
 from mdfconv.brdf.reflection import BRDFS
-from mdfconv.conversion.endpoint import encodings_of, endpoint
 from mdfconv.distributions import distribution, one_parameter_distributions
 from mdfconv.distributions.dialects import DIALECTS, Specular
+from mdfconv.distributions.endpoint import encodings_of, endpoint
 from mdfconv.fitting.metrics import metric_named
-from mdfconv.paper.error_curves import DRAWN
-from mdfconv.render.comparison import PAPER_FIGURES, Rule, Scene, compare, default_rules
+from mdfconv.render.comparison import PAPER_FIGURES, ConversionRule, Scene, compare, default_rules
 from mdfconv.render.comparison_figure import _diverging, draw_comparison
 from mdfconv.render.sphere import (
     LIGHT,
@@ -27,6 +26,7 @@ from mdfconv.render.sphere import (
     highlight,
     radiance,
 )
+from mdfconv.studies.error_curves import DRAWN
 from tests.cli.runner import run, run_on_terminal
 
 NAMES = ["beckmann", "blinn-phong", "gauss", "ggx", "sawicki", "schlick", "smoothie", "gtr"]
@@ -140,8 +140,8 @@ def test_the_rows_say_what_they_keep():
         "closed-form (shape)", "fit energy (light)", "fit display (picture)",
     ]  # fmt: skip
     assert str(default_rules(4.0)[-1].metric) == "display:4"
-    assert Rule("half-angle", metric_named("unit")).label == "half-angle"
-    assert Rule("fit", metric_named("unit")).label == "fit unit (shape)"
+    assert ConversionRule("half-angle", metric_named("unit")).label == "half-angle"
+    assert ConversionRule("fit", metric_named("unit")).label == "fit unit (shape)"
 
 
 def test_the_papers_pictures_come_back():
@@ -248,7 +248,7 @@ def test_any_form_is_compared_with_any(name):
     value = float(end.encode(np.array(endpoint("beckmann").distribution.parameter.typical_value)))
     if end.distribution.parameter.larger_is_smoother:
         value = float(end.encode(np.array(50.0)))
-    rules = [Rule("fit", metric_named("energy"))]
+    rules = [ConversionRule("fit", metric_named("energy"))]
     scene = Scene(size=64)
     from_it = compare(value, rules, scene, name, ["beckmann", "ggx:roughness"])
     assert (from_it.reference.name, from_it.reference.value) == (end.label, value)
@@ -274,7 +274,9 @@ def test_no_text_is_cut_off_or_lies_on_another(targets, name, monkeypatch):
         (d.name for d in DIALECTS if "blinn-phong" in d.owners and d.specular is Specular.no),
         key=len,
     )
-    rules = [Rule("fit", metric_named(kept)) for kept in ("energy", "display:2.25", "unit")]
+    rules = [
+        ConversionRule("fit", metric_named(kept)) for kept in ("energy", "display:2.25", "unit")
+    ]
     ends = [longest, "ggx:roughness", "gauss", "schlick", "sawicki", "ggx", "beckmann", "gtr"]
     scene = Scene(size=200, material="polycarbonate", brdf="smoothie-approx")
     value = float(endpoint(longest).encode(np.array(90.0 if name == "whole" else 400.0)))

@@ -17,7 +17,7 @@ from PIL import Image
 import mdfconv
 from mdfconv.errors import MdfconvError
 from mdfconv.scene import GltfTextures, convert_gltf
-from mdfconv.scene.gltf import dialects_by_generator, generator_of
+from mdfconv.scene.gltf.asset import dialects_by_generator, generator_of
 from tests.cli.runner import run, run_on_terminal
 
 pygltflib = pytest.importorskip("pygltflib")

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import mdfconv
-from mdfconv.conversion.endpoint import endpoints
-from mdfconv.conversion.remaining_error import remaining_error
+from mdfconv.conversion.explanation import remaining_error
+from mdfconv.distributions.endpoint import endpoints
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.scene import convert_mitsuba
 from tests.cli.runner import run, run_on_terminal

@@ -13,8 +13,8 @@ from hypothesis.extra import numpy as arrays
 import mdfconv
 from mdfconv import MdfconvError, MdfconvWarning
 from mdfconv.scene import TextureRule, convert_texture
-from mdfconv.scene import texture as texture_module
-from mdfconv.scene.texture_dither import ErrorDiffusion
+from mdfconv.scene.texture import convert as texture_module
+from mdfconv.scene.texture.texel_map import ErrorDiffusion
 
 RULES = [
     ("ggx:alpha", "ggx:roughness"),

@@ -9,7 +9,7 @@ from PIL import Image
 
 from mdfconv import MdfconvError
 from mdfconv.scene import TextureRule, convert_texture, convert_texture_file
-from mdfconv.scene import texture as texture_module
+from mdfconv.scene.texture import convert as texture_module
 from tests.scene.pictures import (
     PROFILE,
     exr_header,

@@ -1,6 +1,6 @@
 """What "best fit" means: the metrics under which two distributions are compared.
 
-A new metric is a module that defines ``METRIC``, its class, and one line in `_MODULES`.
+A new metric is a module that defines ``METRICS``, its classes, and one line in `_MODULES`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from mdfconv.registry import Registry
 __all__ = ["Metric", "list_metrics", "metric_named", "register_metric"]
 
 # The default first.
-_MODULES = ("unit", "energy", "display", "environment", "light")
+_MODULES = ("base", "light")
 
 _REGISTRY: Registry[type[Metric]] = Registry("metric")
 
@@ -31,7 +31,8 @@ def register_metric(kind: type[Metric]) -> None:
 
 
 for _module in _MODULES:
-    register_metric(import_module(f"{__name__}.{_module}").METRIC)
+    for _kind in import_module(f"{__name__}.{_module}").METRICS:
+        register_metric(_kind)
 
 
 def list_metrics() -> list[str]:

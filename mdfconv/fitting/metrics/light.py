@@ -17,7 +17,7 @@ from mdfconv.light.lobe_spectrum import LobeSpectrum
 from mdfconv.light.spectrum import Spectrum, spectrum_of_file
 
 
-class Light(Metric):
+class LightMetric(Metric):
     """The light of an environment map: Σ (2l+1) C_l (Δk_l)².
 
     A lobe blurs the environment, which multiplies degree l by k_l; C_l is the angular power of
@@ -116,4 +116,4 @@ def _lobe_spectrum(highest: int) -> LobeSpectrum:
     return LobeSpectrum(highest)
 
 
-METRIC = Light
+METRICS = (LightMetric,)

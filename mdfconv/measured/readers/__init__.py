@@ -9,9 +9,8 @@ from importlib import import_module
 from pathlib import Path
 
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.directional import DirectionalSamples
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, open_source
-from mdfconv.measured.samples import Samples
+from mdfconv.measured.samples import DirectionalSamples, Samples
 
 __all__ = ["ReadOptions", "Reader", "Source", "list_readers", "read"]
 

@@ -12,14 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
-from mdfconv.brdf.directions import azimuth, direction, polar_angle
+from mdfconv.brdf.microfacet import azimuth, direction, polar_angle
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.directional import DirectionalSamples, directional_samples
-from mdfconv.measured.readers.angles import from_half_and_difference
-from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, decode_head
+from mdfconv.measured.readers.base import (
+    Reader,
+    ReadOptions,
+    Source,
+    decode,
+    decode_head,
+    from_half_and_difference,
+)
 from mdfconv.measured.readers.tables import parse_table
-from mdfconv.measured.samples import Samples, samples
+from mdfconv.measured.samples import DirectionalSamples, Samples, directional_samples, samples
 
 _TAG = re.compile(r"^#[ \t]*([A-Z_]+)[ \t]+([^\n]*?)\s*$", re.M)
 _DIMENSIONS = re.compile(r"^#\s*DIM\s+\S", re.M)

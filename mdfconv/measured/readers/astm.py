@@ -10,11 +10,10 @@ import re
 from pathlib import Path
 
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.directional import DirectionalSamples
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, decode_head
 from mdfconv.measured.readers.tables import parse_table
 from mdfconv.measured.readers.text import read_table
-from mdfconv.measured.samples import Samples
+from mdfconv.measured.samples import DirectionalSamples, Samples
 
 _VARIABLES = re.compile(r"^\s*VARS[ \t]*:?[ \t]+(?P<names>\S.*?)\s*$", re.M | re.I)
 _COUNT = re.compile(r"^\s*NUM_POINTS[ \t]*:?[ \t]+(?P<count>\S+)", re.M | re.I)

@@ -8,9 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
+from mdfconv.brdf.microfacet import direction, mirrored
+from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.directional import DirectionalSamples
-from mdfconv.measured.samples import Samples
+from mdfconv.measured.samples import DirectionalSamples, Samples
 from mdfconv.output.files import STANDARD_INPUT
 
 # Laboratories write pages of comments before the words that a format is known by.
@@ -151,3 +154,38 @@ def decode_head(head: bytes) -> str:
 def _encoding(content: bytes) -> str:
     marks = (name for mark, name in _BYTE_ORDER_MARKS.items() if content.startswith(mark))
     return next(marks, "utf-8")
+
+
+def turn_from_normal(vectors: Array, theta: Array, phi: Array) -> Array:
+    """Return vectors, shape (n, 3), turned as the normal has to be to come to (θ, φ).
+
+    First by θ in the plane of x and z, then by φ about the normal.
+    """
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    x, z = np.cos(theta) * x + np.sin(theta) * z, np.cos(theta) * z - np.sin(theta) * x
+    return np.stack([np.cos(phi) * x - np.sin(phi) * y, np.sin(phi) * x + np.cos(phi) * y, z], -1)
+
+
+def from_half_and_difference(
+    theta_half: Array, phi_half: Array, theta_difference: Array, phi_difference: Array
+) -> tuple[Array, Array]:
+    """Return the two directions of the coordinates of Rusinkiewicz 1998, each of shape (n, 3).
+
+    Parameters
+    ----------
+    theta_half, phi_half : numpy.ndarray, shape (n,)
+        Zenith and azimuth of the half vector, radians.
+    theta_difference, phi_difference : numpy.ndarray, shape (n,)
+        Those of the first direction where the half vector is the normal.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        The first direction, and the one on the other side of the half vector.
+    """
+    first = direction(theta_difference, phi_difference)
+    second = mirrored(first)
+    return (
+        turn_from_normal(first, theta_half, phi_half),
+        turn_from_normal(second, theta_half, phi_half),
+    )

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.directional import DirectionalSamples, directional_samples
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, decode_head
+from mdfconv.measured.samples import DirectionalSamples, directional_samples
 
 _KNOWN_BY = re.compile(r"^\s*type\s+bsdf_data\b", re.M | re.I)
 _SETTING = re.compile(r"(\w+)\s*=\s*(\S+)")

@@ -6,14 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from mdfconv.brdf.directions import azimuth as azimuths
-from mdfconv.brdf.directions import polar_angle
+from mdfconv.brdf.microfacet import azimuth as azimuths
+from mdfconv.brdf.microfacet import polar_angle
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.directional import DirectionalSamples, directional_samples
-from mdfconv.measured.readers.angles import from_half_and_difference
-from mdfconv.measured.readers.base import Reader, ReadOptions, Source, open_source
-from mdfconv.measured.samples import Samples, samples
+from mdfconv.measured.readers.base import (
+    Reader,
+    ReadOptions,
+    Source,
+    from_half_and_difference,
+    open_source,
+)
+from mdfconv.measured.samples import DirectionalSamples, Samples, directional_samples, samples
 
 _HEADER_BYTES = 12
 # Of R, G and B, by which the database's own reader multiplies.

@@ -6,13 +6,137 @@ import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.readers.columns import is_value, role_of
+
+
+class Role(StrEnum):
+    """What a column of angles can hold."""
+
+    theta_i = "zenith of the incident direction"
+    phi_i = "azimuth of the incident direction"
+    theta_o = "zenith of the outgoing direction"
+    phi_o = "azimuth of the outgoing direction"
+    phi = "difference of the azimuths"
+    angle = "angle"
+
+
+_LETTERS = {"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "Δ": " delta ", "δ": " delta "}
+_ZENITH = {"theta", "zenith", "polar", "colatitude", "th"}
+_AZIMUTH = {"phi", "azimuth", "azimuthal", "azi", "az", "ph"}
+_ANGLE = {"angle", "beta", "alpha"}
+_INCIDENT = {
+    "i", "in", "inc", "incident", "incidence", "incoming", "ingoing", "input", "light", "l",
+    "source", "src", "illumination", "aoi",
+}  # fmt: skip
+_OUTGOING = {
+    "o", "out", "outgoing", "output", "r", "refl", "reflected", "reflection", "s", "scat",
+    "scatter", "scattered", "scattering", "v", "view", "viewing", "viewer", "detector", "det",
+    "observer", "observation", "e", "exit", "emergent", "emission", "exitant",
+}  # fmt: skip
+_DIFFERENCE = {"delta", "relative", "rel", "diff", "difference"}
+_HALF = {"h", "half", "halfway"}
+_OF_HALF = _HALF | {"beta"}
+_UNITS = {"deg", "degree", "degrees", "rad", "radian", "radians", "cos", "cosine"}
+_FILLERS = {"of", "the", "direction", "dir", "vector", "normal", "w", "omega"}
+_JOINED = re.compile(r"(delta|d)?(theta|phi|zenith|azimuth)(\w*)")
+_VALUES = {
+    "brdf", "bsdf", "f", "fr", "value", "values", "val", "r", "g", "b", "red", "green", "blue",
+    "x", "y", "z", "luminance", "ndf", "d", "reflectance",
+}  # fmt: skip
+_WAVELENGTH = re.compile(r"(lambda|wl|brdf|bsdf|r)?\s*_?\d{3,4}(\.\d+)?\s*(nm)?", re.I)
+_INDEX = {"", "index", "idx", "no", "nr", "n", "id", "row", "sample", "point", "num", "number", "i"}
+
+
+def role_of(name: str) -> Role | None:
+    """Return what kind of angle a name speaks of; None if of none, or of another coordinate."""
+    words = _words(name)
+    kinds = set(words)
+    sides = kinds - _ZENITH - _AZIMUTH - _ANGLE - _UNITS
+    incident, outgoing = bool(sides & _INCIDENT), bool(sides & _OUTGOING)
+    if kinds & _AZIMUTH:
+        if sides & _DIFFERENCE or not sides - _FILLERS:
+            return Role.phi
+        if incident != outgoing:
+            return Role.phi_i if incident else Role.phi_o
+        return None
+    if kinds & (_ZENITH | _ANGLE) or "aoi" in kinds:
+        if sides & _HALF or not sides - _FILLERS:
+            return Role.angle
+        return _side(incident, outgoing)
+    return Role.angle if kinds & _UNITS and not kinds - _UNITS else None
+
+
+def _side(incident: bool, outgoing: bool) -> Role | None:
+    if incident == outgoing:
+        return None
+    return Role.theta_i if incident else Role.theta_o
+
+
+def is_half(name: str) -> bool:
+    """Return whether a name is one of the angle of half vectors."""
+    return bool(set(_words(name)) & _OF_HALF)
+
+
+def is_angle(name: str) -> bool:
+    """Return whether a name is one of an angle, be it of coordinates that are not read."""
+    return bool(set(_words(name)) & (_ZENITH | _AZIMUTH | _ANGLE)) or role_of(name) is not None
+
+
+def is_value(name: str) -> bool:
+    """Return whether a name is one of values: of a BRDF, a channel or a wavelength."""
+    bare = _bare(name)
+    joined = re.sub(r"[^a-z0-9]", "", bare)
+    return joined in _VALUES or bool(_WAVELENGTH.fullmatch(bare.strip()))
+
+
+def is_wavelength(name: str) -> bool:
+    """Return whether a name is that of a column of wavelengths."""
+    return re.sub(r"[^a-zλ]", "", _bare(name)) in {"wavelength", "lambda", "λ", "wavelengthnm"}
+
+
+def counts_rows(name: str, numbers: Array) -> bool:
+    """Return whether a column is called an index and counts, from 0 or 1."""
+    called = re.sub(r"[^a-z]|unnamed", "", name.lower()) in _INDEX and role_of(name) is None
+    return called and is_counting(numbers)
+
+
+def is_counting(numbers: Array) -> bool:
+    """Return whether numbers count, from 0 or 1."""
+    first = numbers[0]
+    return (
+        numbers.size > 2
+        and first in (0, 1)
+        and bool(np.array_equal(numbers, first + np.arange(numbers.size)))
+    )
+
+
+def _bare(name: str) -> str:
+    """Return a name in small letters, without what stands in brackets."""
+    return re.sub(r"[\[({].*?[\])}]", " ", name).lower()
+
+
+def _words(name: str) -> list[str]:
+    """Return the words of a name: thetaIn, theta_in and θ in are theta and in."""
+    text = name.replace("°", " deg ")
+    for letter, word in _LETTERS.items():
+        text = text.replace(letter, word)
+    text = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)
+    words = []
+    for word in re.findall(r"[a-z]+", text.lower()):
+        joined = _JOINED.fullmatch(word)
+        if joined:
+            difference, kind, side = joined.groups()
+            words += ["delta"] * bool(difference) + [kind] + [side] * bool(side)
+        else:
+            words.append(word)
+    return words
+
 
 _COMMENT = re.compile(r"^\s*(#+|%+|//+|!+)\s?")
 # Lines by which the form of a table is decided.
@@ -24,7 +148,7 @@ _UNIT = re.compile(
 
 
 @dataclass(frozen=True)
-class Form:
+class TableForm:
     """How the cells of a line are set apart; blanks if the separator is None."""
 
     separator: str | None
@@ -58,14 +182,14 @@ class Form:
 
 # Those with decimal points first: of forms that read a table alike, the first is taken.
 _FORMS = (
-    Form(";"),
-    Form("\t"),
-    Form(","),
-    Form(None),
-    Form(";", decimal_comma=True),
-    Form("\t", decimal_comma=True),
-    Form(None, decimal_comma=True),
-    Form(",", decimal_comma=True),
+    TableForm(";"),
+    TableForm("\t"),
+    TableForm(","),
+    TableForm(None),
+    TableForm(";", decimal_comma=True),
+    TableForm("\t", decimal_comma=True),
+    TableForm(None, decimal_comma=True),
+    TableForm(",", decimal_comma=True),
 )
 
 
@@ -131,7 +255,7 @@ def parse_table(path: Path, lines: Sequence[str]) -> Table:
     return table if is_named else _named_in_comments(table, form)
 
 
-def _form_of(lines: Sequence[str]) -> Form:
+def _form_of(lines: Sequence[str]) -> TableForm:
     """Return the form under which the most lines are numbers, more than one a line if any is."""
     rows = [[form.numbers(line) for line in lines] for form in _FORMS]
     wide = [sum(row is not None and len(row) > 1 for row in read) for read in rows]
@@ -140,11 +264,11 @@ def _form_of(lines: Sequence[str]) -> Form:
     separators = (
         form for form in _FORMS if form.separator and lines and form.separator in lines[0]
     )
-    return next(separators, Form(None))
+    return next(separators, TableForm(None))
 
 
 def _numbers(
-    path: Path, rows: Sequence[tuple[int, str]], form: Form
+    path: Path, rows: Sequence[tuple[int, str]], form: TableForm
 ) -> tuple[list[tuple[int, str]], Array]:
     """Return the lines before the first row of numbers, and the numbers."""
     headers: list[tuple[int, str]] = []
@@ -173,7 +297,7 @@ def _numbers(
 
 
 def _names(
-    path: Path, headers: Sequence[tuple[int, str]], width: int, form: Form
+    path: Path, headers: Sequence[tuple[int, str]], width: int, form: TableForm
 ) -> tuple[list[str], list[str]]:
     """Return the names and the units that the lines above the numbers give."""
     if not headers:
@@ -195,7 +319,7 @@ def _names(
     return names, units
 
 
-def _split_to_width(line: str, form: Form, width: int | None) -> list[str]:
+def _split_to_width(line: str, form: TableForm, width: int | None) -> list[str]:
     """Return the cells of a line of words, which may be separated otherwise than the numbers."""
     cells = form.cells(line)
     if width is None or len(cells) == width:
@@ -215,7 +339,7 @@ def _without_empty_columns(table: Table) -> Table:
     )
 
 
-def _named_in_comments(table: Table, form: Form) -> Table:
+def _named_in_comments(table: Table, form: TableForm) -> Table:
     """Take the names from the last comment that can be one: as many, and some known ones."""
     width = table.numbers.shape[1]
     for comment in reversed(table.comments):

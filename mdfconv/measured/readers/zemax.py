@@ -8,20 +8,87 @@ and the azimuth about it, 0 towards the normal of the surface and counter-clockw
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from mdfconv.brdf.directions import azimuth as azimuths
-from mdfconv.brdf.directions import direction, polar_angle
+from mdfconv.brdf.microfacet import azimuth as azimuths
+from mdfconv.brdf.microfacet import direction, polar_angle
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.directional import DirectionalSamples, directional_samples
-from mdfconv.measured.readers.angles import turn_from_normal
-from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, decode_head
-from mdfconv.measured.readers.words import Words
+from mdfconv.measured.readers.base import (
+    Reader,
+    ReadOptions,
+    Source,
+    decode,
+    decode_head,
+    turn_from_normal,
+)
+from mdfconv.measured.samples import DirectionalSamples, directional_samples
+
+
+class Words:
+    """A place in a text that moves on from word to word.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for messages.
+    lines : iterable of (int, str)
+        Its lines and their numbers from 1, without comments.
+    """
+
+    def __init__(self, path: Path, lines: Iterable[tuple[int, str]]) -> None:
+        self._path = path
+        self._words = [(number, word) for number, line in lines for word in line.split()]
+        self._at = 0
+
+    def peek(self) -> str | None:
+        """Return the next word without moving on; None at the end."""
+        return self._words[self._at][1] if self._at < len(self._words) else None
+
+    def next(self, what: str) -> str:
+        """Return the next word; raise `MdfconvError` if the text ends before it."""
+        word = self.peek()
+        if word is None:
+            raise MdfconvError(f"{self._path}: truncated: it ends before {what}")
+        self._at += 1
+        return word
+
+    def expect(self, word: str) -> None:
+        """Pass over a word; raise `MdfconvError` if another one stands there."""
+        found = self.next(word)
+        if found.lower() != word.lower():
+            raise self.error(f"'{found[:30]}' where {word} goes")
+
+    def count(self, what: str) -> int:
+        """Return the next word as a count, at most that of the words that follow."""
+        word = self.next(what)
+        if not (word.isascii() and word.isdecimal() and len(word) < 10 and int(word) > 0):
+            raise self.error(f"{what}: '{word[:30]}' is no count")
+        return int(word)
+
+    def numbers(self, count: int, what: str) -> Array:
+        """Return the next numbers, shape (count,)."""
+        words = self._words[self._at : self._at + count]
+        if len(words) < count:
+            raise MdfconvError(f"{self._path}: truncated: it ends within {what}")
+        numbers = np.empty(count)
+        for place, (_, word) in enumerate(words):
+            self._at += 1
+            try:
+                numbers[place] = float(word)
+            except ValueError:
+                raise self.error(f"{what}: '{word[:30]}' is no number") from None
+        return numbers
+
+    def error(self, reason: str) -> MdfconvError:
+        """Return an error about the word that was last read."""
+        number = self._words[max(self._at - 1, 0)][0]
+        return MdfconvError(f"{self._path}, line {number}: {reason}")
+
 
 _KNOWN_BY = re.compile(r"^\s*AngleOfIncidence\s", re.M | re.I)
 _WORDS = ("source", "symmetry", "spectralcontent", "scattertype")

@@ -1,0 +1,223 @@
+"""glTF 2.0: the roughness of every material from what a program stored, every other byte kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import isclose
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+
+from mdfconv.distributions.dialects import DIALECTS, Dialect
+from mdfconv.distributions.endpoint import Endpoint
+from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric, metric_named
+from mdfconv.scene.gltf.container import read_container
+from mdfconv.scene.gltf.document import FACTOR, PBR, GltfDocument, read_document
+from mdfconv.scene.gltf.factors import convert_factors, factor_endpoints
+from mdfconv.scene.gltf.images import GltfTextures
+from mdfconv.scene.gltf.textures import TextureChanges, convert_textures
+from mdfconv.scene.material_files import FileConversion
+from mdfconv.scene.shininess import ROUGHNESS
+
+# Digits enough that an exponent comes back from a roughness to six.
+_DIGITS = 8
+_SAME = 0.5e-8
+# What is wrong with a material whose texture is not to be converted.
+HAS_TEXTURE = "has a roughness texture"
+
+
+@dataclass(frozen=True)
+class GltfMaterial:
+    """One conversion of a material.
+
+    Parameters
+    ----------
+    name : str
+        Its name; "" if it has none.
+    index : int
+        Its place among the materials, from 0.
+    value, result : float
+        The roughness factor before, 1 where there was none, and after.
+    rmse : float
+        The error that the conversion leaves: the relative root mean square of `explain`. NaN for
+        a uniform lobe and for a texture.
+    parameter : float
+        What the program meant by the value, such as an exponent; NaN for a mirror and for a
+        texture.
+    notes : tuple of str
+        What a careful user must know.
+    """
+
+    name: str
+    index: int
+    value: float
+    result: float
+    rmse: float
+    parameter: float
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class GltfConversion(FileConversion):
+    """A converted glTF file; the places of its problems are such as ``materials[3]``.
+
+    Parameters
+    ----------
+    materials : tuple of GltfMaterial
+        What was converted, in the order of the file.
+    generator : str
+        What wrote the file; "" if it does not say.
+    """
+
+    materials: tuple[GltfMaterial, ...]
+    generator: str
+
+
+def convert_gltf(
+    data: bytes,
+    source: str | Endpoint,
+    target: str | Endpoint = ROUGHNESS,
+    *,
+    metric: str | Metric = "environment",
+    textures: GltfTextures | None = None,
+) -> GltfConversion:
+    """Convert the roughness of all materials of a glTF 2.0 file.
+
+    Parameters
+    ----------
+    data : bytes
+        A glTF or a GLB. What is not converted is kept: all other JSON byte by byte, and the
+        chunks behind it.
+    source, target : str or Endpoint
+        What the numbers are, such as ``"blinn-phong:obj2gltf"``, and what they become: glTF
+        defines ``"ggx:roughness"``, α = r².
+    metric : str or Metric
+        What the fit keeps.
+    textures : GltfTextures, optional
+        Where the file's textures are, if they are to be converted; materials with a texture of
+        roughness are left as they are without.
+
+    Returns
+    -------
+    GltfConversion
+        The file and what there is to say about it.
+
+    Raises
+    ------
+    MdfconvError
+        If the file is no glTF 2.0, or a name or the metric is not known.
+    """
+    ends = factor_endpoints(source, target)
+    kept = metric_named(metric)
+    container = read_container(data)
+    document = read_document(container.json)
+    factors, problems = _factors(document)
+    textured = {at: factor for at, factor in factors.items() if factor and document.texture_of(at)}
+    if textures:
+        changes = convert_textures(document, container, textured, ends, kept, textures)
+    else:
+        changes = TextureChanges(problems=dict.fromkeys(textured, HAS_TEXTURE))
+    materials = [
+        GltfMaterial(document.name(at), at, factors[at], 1.0, np.nan, np.nan, notes)
+        for at, notes in changes.notes.items()
+    ]
+    plain = {at: factor for at, factor in factors.items() if at not in textured}
+    converted, left = _converted(document, plain, ends, kept)
+    materials += converted
+    problems |= changes.problems | left
+    document.set_factors(_texts(materials))
+    json = document.encoded()
+    return GltfConversion(
+        data=data if json == container.json else container.with_json(json, changes.appended),
+        materials=tuple(sorted(materials, key=attrgetter("index"))),
+        problems=tuple((f"materials[{at}]", problems[at]) for at in sorted(problems)),
+        files=changes.files,
+        inputs=changes.inputs,
+        generator=document.generator,
+        named=document.named_files,
+    )
+
+
+def _factors(document: GltfDocument) -> tuple[dict[int, float], dict[int, str]]:
+    """Return the roughness factors by the places of their materials, and what is wrong."""
+    factors: dict[int, float] = {}
+    problems: dict[int, str] = {}
+    for at, material in enumerate(document.materials):
+        try:
+            factors[at] = _factor(material)
+        except MdfconvError as error:
+            problems[at] = str(error)
+    return factors, problems
+
+
+def _factor(material: Any) -> float:
+    """Return the roughness factor of a material, 1 if it has none."""
+    if not isinstance(material, dict):
+        raise MdfconvError("is no object")
+    pbr = material.get(PBR, {})
+    if not isinstance(pbr, dict):
+        raise MdfconvError(f"its {PBR} is no object")
+    factor = pbr.get(FACTOR, 1)
+    if not isinstance(factor, int | float) or isinstance(factor, bool) or factor != factor:
+        raise MdfconvError(f"{FACTOR} is not a number")
+    if not 0 <= factor <= 1:
+        raise MdfconvError(f"{FACTOR} {factor!s:.20} is outside 0 ≤ r ≤ 1")
+    return float(factor)
+
+
+def _converted(
+    document: GltfDocument,
+    factors: Mapping[int, float],
+    ends: tuple[Endpoint, Endpoint],
+    metric: Metric,
+) -> tuple[list[GltfMaterial], dict[int, str]]:
+    """Return the conversions of materials without a texture, and why others have none."""
+    # A file repeats its values.
+    values, which = np.unique(np.array(list(factors.values())), return_inverse=True)
+    answers = convert_factors(values, *ends, metric)
+    notes, reasons = answers.notes, answers.problems
+    columns = [each.tolist() for each in (values, answers.result, answers.rmse, answers.parameter)]
+    rows = list(zip(*columns, strict=True))
+    materials, problems = [], {}
+    for at, number in zip(factors, which.tolist(), strict=True):
+        if number in reasons:
+            problems[at] = reasons[number]
+        else:
+            note = (notes[number],) if number in notes else ()
+            value, result, rmse, parameter = rows[number]
+            name = document.name(at)
+            materials.append(GltfMaterial(name, at, value, result, rmse, parameter, note))
+    return materials, problems
+
+
+def _texts(materials: Sequence[GltfMaterial]) -> dict[int, str]:
+    """Return the factors that differ in the digits that are written, by their places."""
+    changed = {
+        entry.index: entry.result
+        for entry in materials
+        if not isclose(entry.value, entry.result, rel_tol=_SAME)
+    }
+    texts = {result: f"{result:.{_DIGITS}g}" for result in set(changed.values())}
+    return {at: texts[result] for at, result in changed.items()}
+
+
+def generator_of(data: bytes) -> str:
+    """Return what wrote a glTF file, as it says itself in ``asset.generator``; "" if nothing.
+
+    Raises
+    ------
+    MdfconvError
+        If the file is no glTF.
+    """
+    return read_document(read_container(data).json).generator
+
+
+def dialects_by_generator(generator: str) -> Iterator[Dialect]:
+    """Yield the dialects of the programs that a generator may name."""
+    text = generator.lower()
+    for dialect in DIALECTS:
+        if any(piece in text for piece in dialect.generators):
+            yield dialect

@@ -1,0 +1,241 @@
+"""The images of a glTF file: read wherever they are, and others put in their places."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, unquote
+
+from mdfconv.errors import MdfconvError
+from mdfconv.scene.gltf.container import Container, aligned
+from mdfconv.scene.gltf.document import GltfDocument, is_address
+from mdfconv.scene.gltf.json_edit import JsonText
+from mdfconv.scene.material_files import free_name, read_file
+
+_DATA = re.compile(r"data:([^,]*),", re.IGNORECASE)
+_SIGNATURES = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg"}
+_UNSAFE = re.compile(r"[^\w.-]+")
+_MIME = "image/png"
+
+
+@dataclass(frozen=True)
+class GltfTextures:
+    """Where the textures of a file are, and which are taken.
+
+    Parameters
+    ----------
+    source : Path
+        The folder that relative addresses start from: that of the file.
+    output : Path
+        The folder of the result, for new files beside it.
+    lossy : bool
+        Whether to take a JPEG, although it has altered the values; it becomes a PNG.
+    """
+
+    source: Path
+    output: Path
+    lossy: bool = False
+
+
+def index_of(value: Any, entries: list[Any], what: str) -> int:
+    """Return an index into the entries of a file, which are objects.
+
+    Raises
+    ------
+    MdfconvError
+        If there is no such entry.
+    """
+    if not is_count(value) or not 0 <= value < len(entries):
+        raise MdfconvError(f"names no {what} that is there")
+    if not isinstance(entries[int(value)].value, dict):
+        raise MdfconvError(f"names a {what} that is no object")
+    return int(value)
+
+
+def is_count(value: Any) -> bool:
+    """Return whether a value of JSON is an integer, however it is written."""
+    whole = isinstance(value, int) or (isinstance(value, float) and value.is_integer())
+    return whole and not isinstance(value, bool)
+
+
+class GltfImages:
+    """The images of a file.
+
+    Parameters
+    ----------
+    document : GltfDocument
+        The JSON, which is changed.
+    container : Container
+        The file.
+    folders : GltfTextures
+        Where other files are.
+    ending : str
+        What the names of new files end in, before the suffix.
+    """
+
+    def __init__(
+        self, document: GltfDocument, container: Container, folders: GltfTextures, ending: str
+    ) -> None:
+        self._document, self._container = document, container
+        self._folders, self._ending = folders, ending
+        self.images, self._views, self._buffers = (
+            document.array(name) for name in ("images", "bufferViews", "buffers")
+        )
+        self.files: dict[Path, bytes] = {}
+        self.appended = b""
+        self._read: dict[Path, bytes] = {}
+        self._new_images: list[str] = []
+        self._new_views: list[str] = []
+
+    def read(self, image: int) -> tuple[bytes, str]:
+        """Return the content of an image and the suffix of its form.
+
+        Raises
+        ------
+        MdfconvError
+            If it cannot be found, or is neither PNG nor JPEG.
+        """
+        entry = self.images[image].value
+        if ("uri" in entry) == ("bufferView" in entry):
+            raise MdfconvError("has not one of uri and bufferView")
+        if "uri" in entry:
+            content = self._from_uri(entry["uri"])
+        else:
+            content = self._from_view(index_of(entry["bufferView"], self._views, "bufferView"))
+        for signature, suffix in _SIGNATURES.items():
+            if content.startswith(signature):
+                return content, suffix
+        raise MdfconvError("is neither PNG nor JPEG")
+
+    def replace(self, image: int, content: bytes) -> None:
+        """Put another PNG in the place of an image, for all that use it."""
+        entry, text = self.images[image].value, self._document.json
+        alone = "uri" not in entry and self._views_used.count(entry["bufferView"]) == 1
+        if alone and self._in_binary(entry):
+            text.set_members(self._views[int(entry["bufferView"])].start, self._append(content))
+            text.set_members(self.images[image].start, _kind(entry))
+        else:
+            text.set_members(self.images[image].start, *self._placed(image, content))
+
+    def add(self, image: int, content: bytes) -> int:
+        """Add an image that is like another one but for its content; return its index."""
+        copy = JsonText(self._document.json.text_of(self.images[image]))
+        copy.set_members(0, *self._placed(image, content))
+        self._new_images.append(copy.changed())
+        return len(self.images) + len(self._new_images) - 1
+
+    def finish(self) -> None:
+        """Write what was added into the document."""
+        self._document.append("images", self._new_images)
+        self._document.append("bufferViews", self._new_views)
+        if self.appended:
+            size = len(self._container.binary or b"")
+            length = aligned(size) + len(self.appended)
+            self._document.json.set_members(self._buffers[0].start, {"byteLength": str(length)})
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The files that were read."""
+        return tuple(self._read)
+
+    @cached_property
+    def _views_used(self) -> list[Any]:
+        """What the document names of its buffer views, each as often as it does."""
+        return [value for key, value in self._document.everything if key == "bufferView"]
+
+    def _in_binary(self, entry: dict[str, Any]) -> bool:
+        """Return whether an image in a buffer view is in the binary chunk of a GLB."""
+        view = self._views[int(entry["bufferView"])].value
+        return view["buffer"] == 0 and "uri" not in self._buffers[0].value
+
+    def _append(self, content: bytes) -> dict[str, str]:
+        """Append to the binary chunk; return the members of a buffer view of it."""
+        start = aligned(len(self._container.binary or b""))
+        offset = aligned(len(self.appended))
+        self.appended = self.appended.ljust(offset, b"\0") + content
+        return {"byteOffset": str(start + offset), "byteLength": str(len(content))}
+
+    def _placed(self, image: int, content: bytes) -> tuple[dict[str, str], dict[str, str]]:
+        """Store a PNG where an image is; return members to set, and new names of members."""
+        entry = self.images[image].value
+        if "uri" in entry:
+            inside = bool(_DATA.match(entry["uri"]))
+            return {"uri": self._stored(image, content, inside=inside)} | _kind(entry), {}
+        if self._in_binary(entry):
+            members = {"buffer": "0"} | self._append(content)
+            pairs = ", ".join(f'"{name}": {value}' for name, value in members.items())
+            self._new_views.append(f"{{{pairs}}}")
+            view = len(self._views) + len(self._new_views) - 1
+            return {"bufferView": str(view)} | _kind(entry), {}
+        buffer = self._buffers[int(self._views[int(entry["bufferView"])].value["buffer"])].value
+        inside = bool(_DATA.match(buffer["uri"]))
+        uri = self._stored(image, content, inside=inside)
+        return {"bufferView": uri} | _kind(entry), {"bufferView": "uri"}
+
+    def _stored(self, image: int, content: bytes, *, inside: bool) -> str:
+        """Return an address in JSON at which content is: within the file, or in a new one."""
+        if inside:
+            return json.dumps(f"data:{_MIME};base64,{base64.b64encode(content).decode()}")
+        entry = self.images[image].value
+        stem = Path(unquote(entry["uri"])).stem if "uri" in entry else entry.get("name")
+        stem = _UNSAFE.sub("_", stem) if isinstance(stem, str) and stem else f"image{image}"
+        path = free_name(self._folders.output, f"{stem}_{self._ending}", ".png", self.files)
+        self.files[path] = content
+        return json.dumps(quote(path.name))
+
+    def _from_uri(self, uri: Any) -> bytes:
+        if not isinstance(uri, str):
+            raise MdfconvError("names a file by what is no text")
+        inside = _DATA.match(uri)
+        if inside:
+            return _decoded(uri[inside.end() :], inside[1])
+        if is_address(uri):
+            raise MdfconvError(f"names {uri}, which is no file beside it")
+        path = self._folders.source / unquote(uri)
+        if path not in self._read:
+            try:
+                self._read[path] = read_file(path)
+            except MdfconvError:
+                raise
+            except ValueError:
+                raise MdfconvError("names a file by what is no name of one") from None
+        return self._read[path]
+
+    def _from_view(self, at: int) -> bytes:
+        view = self._views[at].value
+        buffer = index_of(view.get("buffer"), self._buffers, "buffer")
+        entry = self._buffers[buffer].value
+        offset, length = view.get("byteOffset", 0), view.get("byteLength")
+        if not (is_count(offset) and is_count(length)):
+            raise MdfconvError(f"bufferViews[{at}] has no place in its buffer")
+        content: bytes | memoryview
+        if "uri" in entry:
+            content = self._from_uri(entry["uri"])
+        elif buffer == 0 and self._container.binary is not None:
+            content = self._container.binary
+        else:
+            raise MdfconvError(f"buffers[{buffer}] is not there")
+        if not 0 <= offset <= offset + length <= len(content):
+            raise MdfconvError(f"bufferViews[{at}] is not within its buffer")
+        return bytes(content[int(offset) : int(offset + length)])
+
+
+def _kind(entry: dict[str, Any]) -> dict[str, str]:
+    """Return what to set for an image that says to be no PNG."""
+    return {"mimeType": f'"{_MIME}"'} if entry.get("mimeType", _MIME) != _MIME else {}
+
+
+def _decoded(payload: str, kind: str) -> bytes:
+    """Return the content of a data address."""
+    if not kind.lower().endswith(";base64"):
+        return unquote(payload, "latin-1").encode("latin-1", errors="replace")
+    try:
+        return base64.b64decode(payload, validate=True)
+    except (binascii.Error, ValueError):
+        raise MdfconvError("has a data address that is no base64") from None

@@ -1,0 +1,242 @@
+"""Roughness textures: every texel converted, as arrays and as files."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mdfconv.errors import MdfconvError, MdfconvWarning
+from mdfconv.output.files import StagedFiles, staged_files
+from mdfconv.scene.texture.images import (
+    PictureForm,
+    check_files,
+    check_output,
+    find_channels,
+    open_picture,
+    written,
+)
+from mdfconv.scene.texture.rule import TextureRule
+from mdfconv.scene.texture.texel_map import BLOCK, TexelMap, TextureReport
+from mdfconv.scene.texture.values import ValueConverter
+
+Progress: TypeAlias = Callable[[str, int], AbstractContextManager[Callable[[int], None]]]
+
+
+def convert_texture(
+    array: ArrayLike, rule: TextureRule, *, depth: int | None = None, dither: bool = False
+) -> NDArray[Any]:
+    """Convert the texels of an array.
+
+    Parameters
+    ----------
+    array : array_like of uint8, uint16, float16, float32 or float64, any shape
+        The one channel that holds the roughness. Integers stand for their share of the largest
+        integer.
+    rule : TextureRule
+        What to convert, and how.
+    depth : int, optional
+        8 or 16 for a result of so many bits, from integers; the type is kept if not given.
+    dither : bool
+        Whether a result of 8 bits hands its rounding errors to the neighbours; takes a
+        two-dimensional array.
+
+    Returns
+    -------
+    numpy.ndarray
+        The converted texels, same shape. Texels that have no answer are treated as
+        `mdfconv.scene.texture.values.ValueConverter` says; NaN stays NaN.
+
+    Raises
+    ------
+    MdfconvError
+        If a name is unknown, the pair not covered by the method, or the array not a texture.
+
+    Warns
+    -----
+    MdfconvWarning
+        Once, if texels were clamped or are NaN.
+
+    Examples
+    --------
+    >>> rule = TextureRule("blinn-phong:exponent", "ggx:roughness", metric="energy")
+    >>> convert_texture(np.array([0, 26, 255], np.uint8), rule)
+    array([255,  91,  52], dtype=uint8)
+    """
+    texels = np.asarray(array)
+    if dither and texels.ndim != 2:
+        raise MdfconvError(
+            f"dither takes an array of rows and columns, not of shape {texels.shape}"
+        )
+    convert = TexelMap(rule, texels.dtype, depth, texels.shape[1] if dither else None)
+    converted = np.empty(texels.shape, convert.dtype)
+    rows, results = (each if dither else each.reshape(-1, 1) for each in (texels, converted))
+    step = _rows_a_block(rows.shape[1])
+    for start in range(0, len(rows), step):
+        results[start : start + step] = convert(rows[start : start + step])
+    for note in convert.report().notes(ends=False)[:1]:
+        warnings.warn(note, MdfconvWarning, stacklevel=2)
+    return converted
+
+
+def convert_texture_file(
+    source: str | Path,
+    output: str | Path,
+    rule: TextureRule,
+    *,
+    channel: str | None = None,
+    depth: int | None = None,
+    dither: bool = False,
+    lossy: bool = False,
+    max_pixels: int | None = None,
+    progress: Progress | None = None,
+    files: StagedFiles | None = None,
+) -> TextureReport:
+    """Convert a texture in a PNG, TIFF, TGA or OpenEXR file, and write it to another.
+
+    The other channels, the ICC profile and the resolution are kept, bit by bit unless the depth
+    changes, and a TIFF's orientation. Values are taken as they are stored: a profile is not
+    applied.
+
+    Parameters
+    ----------
+    source, output : str or Path
+        The files; their names end in what they hold: .png, .tif, .tiff, .tga or .exr. EXR becomes
+        EXR, a TIFF of floats a TIFF, and the others become any of the others. An existing output
+        is replaced, whole or not at all.
+    rule : TextureRule
+        What to convert, and how.
+    channel : str, optional
+        r, g, b, a or l (grey), in EXR the channel's name; several as ``"rgb"`` or ``"r,g"``, as
+        for grey that is stored as colour. Needed if there is more than one.
+    depth : int, optional
+        8 or 16 bits for the result; kept if not given.
+    dither : bool
+        Whether a result of 8 bits hands its rounding errors to the neighbours.
+    lossy : bool
+        Whether to accept a source whose compression has altered its values, such as JPEG.
+    max_pixels : int, optional
+        The largest picture that is decoded; 2²⁷ (134217728) if not given.
+    progress : callable, optional
+        ``progress(description, total)``, a context that yields what advances by so many rows.
+    files : StagedFiles, optional
+        What takes the output, to be placed together with other files.
+
+    Returns
+    -------
+    TextureReport
+        How many texels were clamped and why, and histograms before and after, over all chosen
+        channels.
+
+    Raises
+    ------
+    MdfconvError
+        If the rule, the source or the output cannot be; nothing is then written.
+    """
+    source, output = Path(source), Path(output)
+    ValueConverter(rule)  # names are wrong more often than files
+    source_form, form = check_files(source, output, lossy=lossy)
+    upright = form not in (PictureForm.tiff, PictureForm.exr)
+    with (
+        nullcontext(files) if files else staged_files(lambda _: False) as taking,
+        open_picture(
+            source, source_form, lossy=lossy, max_pixels=max_pixels, upright=upright
+        ) as picture,
+    ):
+        channels = find_channels(source, picture.names, channel)
+        dtype = picture.dtype_of(channels)
+        width = picture.width if dither else None
+        convert = TexelMap(rule, dtype, depth, width, channels=len(channels))
+        check_output(picture, form, convert.dtype)
+        with (
+            written(taking.fill(output), form, picture, convert.dtype) as write,
+            progress("rows", picture.height) if progress else nullcontext(_ignore) as advance,
+        ):
+            for block in picture.blocks(BLOCK):
+                write(_converted(block, channels, convert))
+                advance(len(block))
+        return replace(convert.report(), remark=picture.remark())
+
+
+def _converted(block: NDArray[Any], channels: tuple[int, ...], convert: TexelMap) -> NDArray[Any]:
+    """Return some rows with the chosen channels converted, and the others in their depth."""
+    rescaled = _rescaled(block, convert.dtype)
+    for place, channel in enumerate(channels):
+        # Of floats of several types the block has the widest.
+        texels = block[..., channel].astype(convert.source_dtype, copy=False)
+        rescaled[..., channel] = convert(texels, place)
+    return rescaled
+
+
+def _rescaled(block: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return the channels that are not converted in the depth of the result."""
+    if block.dtype == dtype or dtype.kind == "f":
+        return block.copy()
+    if dtype == np.uint16:
+        return block * np.uint16(257)
+    return np.rint(block / np.float32(257)).astype(np.uint8)
+
+
+def _rows_a_block(width: int) -> int:
+    return max(1, BLOCK // max(1, width))
+
+
+def _ignore(rows: int) -> None:
+    pass
+
+
+def convert_texture_bytes(
+    data: bytes, suffix: str, rule: TextureRule, channel: str | None = None
+) -> bytes:
+    """Convert the content of a picture file.
+
+    Parameters
+    ----------
+    data : bytes
+        The content.
+    suffix : str
+        What the file's name ends in, such as ``".png"``.
+    rule, channel
+        As for `convert_texture_file`.
+
+    Returns
+    -------
+    bytes
+        The content of the converted file.
+
+    Raises
+    ------
+    MdfconvError
+        As `convert_texture_file`.
+    """
+    return converted_and_report(data, suffix, rule, channel)[0]
+
+
+def converted_and_report(
+    data: bytes, suffix: str, rule: TextureRule, channel: str | None = None, *, lossy: bool = False
+) -> tuple[bytes, TextureReport]:
+    """Convert the content of a picture file as `convert_texture_bytes`, and say what was done.
+
+    With `lossy` a JPEG is taken, too, and becomes a PNG.
+    """
+    with TemporaryDirectory() as folder:
+        source = Path(folder) / f"texture{suffix}"
+        target = Path(folder) / f"converted{'.png' if lossy else suffix}"
+        source.write_bytes(data)
+        try:
+            report = convert_texture_file(source, target, rule, channel=channel, lossy=lossy)
+        except MdfconvError as error:
+            # The temporary file's name says nothing.
+            reason, hint = (
+                text.replace(str(source), "the texture").replace(str(target), "the result")
+                for text in (error.reason, error.hint)
+            )
+            raise MdfconvError(reason, hint, argument=error.argument) from None
+        return target.read_bytes(), report

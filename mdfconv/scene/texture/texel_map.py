@@ -1,0 +1,295 @@
+"""Error diffusion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+from numpy.typing import NDArray
+
+from mdfconv.errors import MdfconvError
+from mdfconv.scene.texture.rule import TextureRule
+from mdfconv.scene.texture.values import Outcome, ValueConverter
+
+# Rows that are rounded together, of a narrow picture: the memory grows with their square.
+_ROWS = 256
+_RIGHT, _BELOW_LEFT, _BELOW, _BELOW_RIGHT = (np.float32(part / 16) for part in (7, 3, 5, 1))
+
+
+class ErrorDiffusion:
+    """Rounding to 8 bits that hands each texel's error to its neighbours (Floyd & Steinberg 1976).
+
+    The error of a texel goes by 7/16 to the right, 3/16, 5/16 and 1/16 to the left, middle and
+    right below. It is at most half a level, and only what leaves the picture is lost: the sums
+    before and after differ by at most half a level for each texel of the last row and the two
+    edges.
+
+    Parameters
+    ----------
+    width : int
+        Texels a row.
+    """
+
+    def __init__(self, width: int) -> None:
+        self._width = width
+        # Of the row above, from x = −1.
+        self._above = np.zeros(width + 2, np.float32)
+
+    def __call__(self, levels: NDArray[np.float32]) -> NDArray[np.uint8]:
+        """Round the next rows of a picture.
+
+        Parameters
+        ----------
+        levels : numpy.ndarray of float32, shape (rows, width)
+            Values in units of the level, from 0 to 255.
+
+        Returns
+        -------
+        numpy.ndarray of uint8, shape (rows, width)
+        """
+        if levels.size == 0:
+            return levels.astype(np.uint8)
+        step = max(_ROWS, self._width)
+        parts = [self._round(levels[top : top + step]) for top in range(0, len(levels), step)]
+        return np.concatenate(parts)
+
+    def _round(self, levels: NDArray[np.float32]) -> NDArray[np.uint8]:
+        rows, width = levels.shape
+        # Texels with the same x + 2y wait for none of each other: they are one row of the
+        # sheared picture, and one step.
+        steps = width + 2 * (rows - 1)
+        sheared = np.zeros((steps, rows), np.float32)
+        shear = (sheared.strides[0] * 2 + sheared.strides[1], sheared.strides[0])
+        picture = as_strided(sheared, levels.shape, shear)
+        picture[...] = levels
+        # Three steps before the first, and in front of every step the row above.
+        error = np.zeros((steps + 3, rows + 1), np.float32)
+        error[: width + 2, 0] = self._above
+        self._diffuse(sheared, error)
+        self._above[1:-1] = error[3 + 2 * (rows - 1) :, rows]
+        return picture.astype(np.uint8)
+
+    def _diffuse(self, sheared: NDArray[np.float32], error: NDArray[np.float32]) -> None:
+        """Round the sheared picture in place, step by step."""
+        rows = sheared.shape[1]
+        part = np.empty(rows, np.float32)
+        for step in range(sheared.shape[0]):
+            first = max(0, (step - self._width) // 2 + 1)
+            last = min(rows, step // 2 + 1)
+            one, two, three = error[step + 2], error[step + 1], error[step]
+            value, share = sheared[step, first:last], part[first:last]
+            for source, weight in (
+                (one[first + 1 : last + 1], _RIGHT),
+                (one[first:last], _BELOW_LEFT),
+                (two[first:last], _BELOW),
+                (three[first:last], _BELOW_RIGHT),
+            ):
+                np.multiply(source, weight, out=share)
+                value += share
+            np.rint(value, out=share)
+            np.clip(share, 0, 255, out=share)
+            np.subtract(value, share, out=error[step + 3, first + 1 : last + 1])
+            value[...] = share
+
+
+BLOCK = 1 << 19  # texels converted at a time
+BINS = 256
+DEPTHS = (8, 16)
+# Types of which every value fits into a table.
+_TABLED = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float16))
+_TYPES = (*_TABLED, np.dtype(np.float32), np.dtype(np.float64))
+
+
+def result_type(dtype: np.dtype[Any], depth: int | None, dither: bool) -> np.dtype[Any]:
+    """Return the type of the converted texels.
+
+    Parameters
+    ----------
+    dtype : numpy.dtype
+        That of the texture.
+    depth : int or None
+        Bits of an integer texel, 8 or 16; None keeps the type.
+    dither : bool
+        Whether the errors of rounding are to be diffused.
+
+    Raises
+    ------
+    MdfconvError
+        If it is no type of a texture, or cannot have the depth or be dithered.
+    """
+    native = dtype.newbyteorder("=")
+    if native not in _TYPES:
+        names = ", ".join(known.name for known in _TYPES)
+        raise MdfconvError(f"a texture is an array of {names}, not {dtype.name}")
+    if depth is not None:
+        if depth not in DEPTHS:
+            raise MdfconvError(f"the depth of a texture is 8 or 16 bits, not {depth}")
+        if native.kind == "f":
+            raise MdfconvError("a depth is for integers: a texture of floats keeps its type")
+        native = np.dtype(f"u{depth // 8}")
+    if dither and native != np.uint8:
+        raise MdfconvError(f"dither is for results of 8 bits, not for {native.name}")
+    return native
+
+
+@dataclass(frozen=True)
+class TextureReport:
+    """What a conversion did to a texture.
+
+    Parameters
+    ----------
+    source, target : str
+        Distribution and encoding.
+    keeps : str
+        What the conversion keeps, in words; "" if the two are the same lobes.
+    texels : int
+        How many were converted.
+    outcomes : dict of Outcome to int
+        How many were answered, and how many were treated as `ValueConverter` says.
+    before, after : numpy.ndarray of int, shape (256,)
+        Histograms of the stored values from 0 to 1; without NaN.
+    remark : str
+        What else the user must know; "" if nothing.
+    """
+
+    source: str
+    target: str
+    keeps: str
+    texels: int
+    outcomes: dict[Outcome, int]
+    before: NDArray[np.int64]
+    after: NDArray[np.int64]
+    remark: str = ""
+
+    def notes(self, *, ends: bool = True) -> list[str]:
+        """Return what the user must know; `ends` includes mirrors and the roughest."""
+        source, target = self.source, self.target
+        texts = {
+            Outcome.MIRROR: f"perfect mirrors in {source}: they get the smoothest {target}",
+            Outcome.UNIFORM: f"as rough as can be in {source}: they get the roughest {target}",
+            Outcome.UNANSWERED: "without an answer by the method, clamped to the nearest",
+            Outcome.CLAMPED: f"clamped: their results are outside 0..1 in {target}",
+            Outcome.OUTSIDE: f"clamped: they are outside 0..1 in {source}",
+            Outcome.NAN: "NaN, and left so",
+        }
+        if not ends:
+            del texts[Outcome.MIRROR], texts[Outcome.UNIFORM]
+        counts = [
+            f"{self.outcomes[outcome]} of {self.texels} texels are {text}"
+            for outcome, text in texts.items()
+            if self.outcomes[outcome]
+        ]
+        return [*counts, self.remark] if self.remark else counts
+
+
+class TexelMap:
+    """A rule on texels of one type; integers and halves go through a table.
+
+    Parameters
+    ----------
+    rule : TextureRule
+        What to convert, and how.
+    dtype : numpy.dtype
+        Type of the texels.
+    depth : int or None
+        Bits of the result, 8 or 16; None keeps the type.
+    width : int or None
+        Texels a row, to diffuse the errors of rounding; None rounds each texel for itself.
+    channels : int
+        How many channels are converted, whose errors do not mix.
+
+    Raises
+    ------
+    MdfconvError
+        If the rule or the type cannot be converted.
+    """
+
+    def __init__(
+        self,
+        rule: TextureRule,
+        dtype: np.dtype[Any],
+        depth: int | None,
+        width: int | None = None,
+        *,
+        channels: int = 1,
+    ) -> None:
+        self.dtype = result_type(dtype, depth, width is not None)
+        self.source_dtype = dtype.newbyteorder("=")
+        self._convert = ValueConverter(rule)
+        self._dither = [] if width is None else [ErrorDiffusion(width) for _ in range(channels)]
+        self._outcomes = np.zeros(len(Outcome), np.int64)
+        self._before, self._after = (np.zeros(BINS, np.int64) for _ in range(2))
+        self._table = self._tabled() if self.source_dtype in _TABLED else None
+
+    def __call__(self, block: NDArray[Any], channel: int = 0) -> NDArray[Any]:
+        """Convert some texels, any shape; with dither the next rows of a channel."""
+        texels = block.astype(self.source_dtype, copy=False)
+        if self._table is None:
+            values, outcomes = self._convert(texels.astype(np.float64))
+            converted: NDArray[Any] = values.astype(self.dtype)
+            self._outcomes += np.bincount(outcomes.ravel(), minlength=len(Outcome))
+            self._before += _histogram(texels)
+        else:
+            key = texels.view(f"u{self.source_dtype.itemsize}")
+            self._counts += np.bincount(key.ravel(), minlength=self._counts.size)
+            converted = self._table[key]
+            if self._dither:
+                converted = self._dither[channel](converted)
+        self._after += _histogram(converted)
+        return converted
+
+    def report(self) -> TextureReport:
+        """Return what was done so far."""
+        outcomes, before = self._outcomes, self._before
+        if self._table is not None:
+            outcomes = np.zeros_like(self._outcomes)
+            np.add.at(outcomes, self._table_outcomes, self._counts)
+            before = self._histogram_of_counts()
+        return TextureReport(
+            *self._convert.labels,
+            self._convert.keeps,
+            texels=int(outcomes.sum()),
+            outcomes=dict(zip(Outcome, outcomes.tolist(), strict=True)),
+            before=before,
+            after=self._after.copy(),
+        )
+
+    def _tabled(self) -> NDArray[Any]:
+        """Return the answer for every value of the type, in levels if it is dithered."""
+        every = np.arange(1 << 8 * self.source_dtype.itemsize).astype(
+            f"u{self.source_dtype.itemsize}"
+        )
+        self._counts = np.zeros(every.size, np.int64)
+        stored = every.view(self.source_dtype).astype(np.float64)
+        if self.source_dtype.kind == "u":
+            stored /= every[-1]
+        values, self._table_outcomes = self._convert(stored)
+        if self.dtype.kind == "f":
+            return values.astype(self.dtype)
+        levels = values * np.iinfo(self.dtype).max
+        return levels.astype(np.float32) if self._dither else np.rint(levels).astype(self.dtype)
+
+    def _histogram_of_counts(self) -> NDArray[np.int64]:
+        every = np.arange(self._counts.size).astype(f"u{self.source_dtype.itemsize}")
+        texels = every.view(self.source_dtype)
+        known = ~np.isnan(texels)
+        before = np.zeros(BINS, np.int64)
+        np.add.at(before, _bins(texels[known]), self._counts[known])
+        return before
+
+
+def _histogram(texels: NDArray[Any]) -> NDArray[np.int64]:
+    known = texels if texels.dtype.kind == "u" else texels[~np.isnan(texels)]
+    return np.bincount(_bins(known).ravel(), minlength=BINS)
+
+
+def _bins(texels: NDArray[Any]) -> NDArray[Any]:
+    """Return which of 256 bins from 0 to 1 each texel falls into."""
+    if texels.dtype == np.uint8:
+        return texels
+    if texels.dtype == np.uint16:
+        return texels >> 8
+    scaled = np.clip(texels, 0, 1) * (BINS - 1)
+    return np.rint(scaled).astype(np.uint8)

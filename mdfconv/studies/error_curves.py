@@ -1,0 +1,190 @@
+"""Curves of distributions and of their error against one of them: Figures 1 and 2."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mdfconv.conversion import convert
+from mdfconv.distributions import Distribution, distribution
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric
+from mdfconv.output.figures import encoded, line_style, new_figure
+from mdfconv.output.records import csv_text, rounded_rows
+
+# Sawicki 2021, captions of Figures 1 and 2.
+PAPER_SETS: Mapping[str, Mapping[str, float]] = {
+    "fig1": {
+        "beckmann": 0.4, "blinn-phong": 10, "gauss": 0.4364, "ggx": 0.4456, "sawicki": 12.04,
+        "schlick": 0.4,
+    },
+    "fig2": {
+        "beckmann": 0.04464, "blinn-phong": 1000, "gauss": 0.04471, "ggx": 0.05354,
+        "sawicki": 1174.3, "schlick": 0.04464,
+    },
+}  # fmt: skip
+DRAWN = ("blinn-phong", "gauss", "ggx", "sawicki", "schlick")
+_MOST_POINTS = 1_000_000
+# 4.8 β_half is 4 m_B for Beckmann, the paper's habit.
+_HALF_WIDTHS = 4.8
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Distributions against β, and their error.
+
+    Parameters
+    ----------
+    parameters : dict
+        From names to parameters, the reference first.
+    beta : numpy.ndarray, shape (n,)
+        Angles, radians.
+    values : dict
+        From names to the metric's signal: D̄ for the unit metric.
+    quantity : str
+        What the values are, for an axis.
+    errors : dict
+        From names but the reference's to (signal − reference)/max reference.
+    """
+
+    parameters: Mapping[str, float]
+    beta: Array
+    values: Mapping[str, Array]
+    quantity: str
+    errors: Mapping[str, Array]
+
+    @property
+    def reference(self) -> str:
+        """The name of the distribution that the others are compared with."""
+        return next(iter(self.parameters))
+
+    def error_text(self) -> str:
+        """Return the errors as CSV: beta_rad, then a column a distribution."""
+        columns = {"beta_rad": self.beta, **self.errors}
+        return csv_text(list(columns), rounded_rows(columns))
+
+    def maxima(self) -> list[dict[str, Any]]:
+        """Return for each distribution the largest |error| and where it occurs."""
+        rows = []
+        for name, error in self.errors.items():
+            index = int(np.argmax(np.abs(error)))
+            rows.append(
+                {
+                    "distribution": name,
+                    "parameter": float(self.parameters[name]),
+                    "max_error_percent": 100 * float(abs(error[index])),
+                    "beta_rad": float(self.beta[index]),
+                }
+            )
+        return rows
+
+
+def lobe_extent(distribution: Distribution, parameter: Array) -> Array:
+    """Return the angle up to which the figures show a lobe: 4.8 β_half, at most π/2, radians."""
+    extent = _HALF_WIDTHS * distribution.half_width(parameter)
+    return np.where(extent <= np.pi / 2, extent, np.pi / 2)
+
+
+def parameters_for(
+    m_b: float, names: Sequence[str], method: str | None, metric: Metric | None
+) -> dict[str, float]:
+    """Return the parameters of distributions converted from Beckmann's m_B."""
+    return {name: float(convert(m_b, "beckmann", name, method, metric=metric)) for name in names}
+
+
+def curves(parameters: Mapping[str, float], reference: str, metric: Metric, points: int) -> Curves:
+    """Evaluate distributions on a range of β that follows the reference's lobe.
+
+    Parameters
+    ----------
+    parameters : dict
+        From names to parameters; the reference is among them.
+    reference : str
+        The distribution to compare with.
+    metric : Metric
+        Unit compares unit forms, as the paper; others what they compare in a fit.
+    points : int
+        Number of angles, from 0 to 4.8 β_half of the reference, at most π/2.
+
+    Raises
+    ------
+    MdfconvError
+        If the number of points is none, or the metric does not compare over β.
+    """
+    if not 2 <= points <= _MOST_POINTS:
+        raise MdfconvError(f"the number of points is from 2 to {_MOST_POINTS}")
+    if not metric.over_angles:
+        raise MdfconvError(f"{metric} compares spectra: it has no curves over β")
+    source, parameter = distribution(reference), np.array([parameters[reference]])
+    beta = np.linspace(0, float(lobe_extent(source, parameter)[0]), points)
+    peak = source.maximum(parameter, normalized=metric.normalized)
+    values = {
+        name: metric.signal(distribution(name), beta, np.array([float(parameters[name])]), peak)
+        for name in dict.fromkeys([reference, *parameters])
+    }
+    top = values[reference].max()
+    errors = {
+        name: (value - values[reference]) / top
+        for name, value in values.items()
+        if name != reference
+    }
+    shown = {name: parameters[name] for name in values}
+    return Curves(shown, beta, values, metric.quantity, errors)
+
+
+_SIZE = (7.2, 7.0)  # inches
+_FLOOR = 1e-6  # of the logarithmic axis
+
+
+def draw_errors(
+    drawn: Curves, title: str, *, form: str = "png", dpi: int = 150, log: bool = False
+) -> bytes:
+    """Return a picture of curves (a) and of their error (b).
+
+    Parameters
+    ----------
+    drawn : Curves
+        The curves.
+    title : str
+        What is shown.
+    form : str
+        ``"png"`` or ``"svg"``.
+    dpi : int
+        Resolution of a PNG.
+    log : bool
+        Whether (a) is logarithmic, for the tails.
+    """
+    figure = new_figure(*_SIZE)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    for name, value in drawn.values.items():
+        symbol = distribution(name).parameter.symbol
+        label = f"{name}, {symbol} = {drawn.parameters[name]:.5g}"
+        _line(upper, drawn, name, value, label)
+    for name, error in drawn.errors.items():
+        _line(lower, drawn, name, 100 * error, name)
+    figure.suptitle(title)
+    if log:
+        upper.set_yscale("log")
+        upper.set_ylim(_FLOOR, 2)
+    upper.set_ylabel(f"(a) {drawn.quantity}")
+    upper.legend(fontsize=8)
+    lower.axhline(0, color="0.4", linewidth=0.8)
+    lower.set_ylabel(f"(b) error against {drawn.reference} [%]")
+    lower.set_xlabel("β between normal and half vector [rad]")
+    lower.set_xlim(0, drawn.beta[-1])
+    return encoded(figure, form, dpi)
+
+
+def _line(axes: Any, drawn: Curves, name: str, value: Any, label: str) -> None:
+    """Draw one distribution, on its support and marked where that ends."""
+    edge = distribution(name).edge(np.array([drawn.parameters[name]]))
+    inside = np.ones(drawn.beta.size, bool) if edge is None else drawn.beta <= edge[0]
+    style = line_style(name)
+    axes.plot(drawn.beta[inside], value[inside], label=label, **style)
+    if not inside.all():
+        last = int(np.flatnonzero(inside)[-1])
+        axes.plot(drawn.beta[last], value[last], "|", color=style["color"], markersize=11)

@@ -1,0 +1,426 @@
+"""The white furnace: how much of the light that comes from everywhere alike is reflected.
+
+The directional albedo ∫ f(l, v) cos θ_l dω_l of a surface that absorbs nothing is 1. It is
+integrated by quadrature on panels that end where the integrand has its kinks (the horizon) and
+shrink towards its peak (the mirror image, or the half vector along the normal).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from mdfconv.brdf import reflection
+from mdfconv.brdf import reflection as phong
+from mdfconv.brdf.fresnel import Fresnel, lossless
+from mdfconv.brdf.microfacet import (
+    MASKINGS,
+    Brdf,
+    Microsurface,
+    direction,
+    dot,
+    frames,
+    mirrored,
+    reflect,
+)
+from mdfconv.distributions import distribution
+from mdfconv.distributions.evaluation import Array, gauss_legendre, gauss_panels
+from mdfconv.errors import MdfconvError
+from mdfconv.registry import Registry
+
+
+def cosine_lobe(axis: Array, exponent: float, u1: Array, u2: Array) -> Array:
+    """Draw directions around an axis with density (γ+1)/(2π) cos^γ (Lafortune & Willems 1994).
+
+    Parameters
+    ----------
+    axis : numpy.ndarray, shape (..., 3)
+        Unit vector; with the normal and γ = 1 the draw is cosine-weighted.
+    exponent : float
+        γ ≥ 0.
+    u1, u2 : numpy.ndarray
+        Uniform random numbers.
+    """
+    # 1 − cos θ = −expm1(ln(1−u)/(γ+1)) keeps the digits of narrow lobes.
+    drop = -np.expm1(np.log1p(-u1) / (exponent + 1))
+    local = direction(2 * np.arcsin(np.sqrt(0.5 * drop)), 2 * np.pi * u2)
+    drawn: Array = np.einsum("...i,...ij->...j", local, frames(axis))
+    return drawn
+
+
+def cosine_lobe_density(axis: Array, exponent: float, omega: Array) -> Array:
+    """Return the density of `cosine_lobe`."""
+    drop = 0.5 * np.square(omega - axis).sum(axis=-1)
+    inside = drop < 1
+    power = np.exp(exponent * np.log1p(-np.where(inside, drop, 0)))
+    return np.where(inside, (exponent + 1) / (2 * np.pi) * power, 0)
+
+
+def reflected_density(half_density: Array, view: Array, m: Array) -> Array:
+    """Return the density of reflected directions for that of half vectors: p/(4 |v·m|)."""
+    cosine = np.abs(dot(view, m))
+    return half_density / (4 * np.where(cosine > 0, cosine, np.inf))
+
+
+def energy_response(alpha: float) -> float:
+    """Return ∫∫ sin θ cos θ D(θ/2) dθ dφ = 2π (½ + ½α² ln α − ¼α² ln(α²+2)).
+
+    D is the article's, (α + 4 sin²β/α)^(−2), which is not normalized. The article prints
+    ½ + α² ln α − ½α² ln(1+α²), which is not this integral.
+    """
+    square = alpha * alpha
+    logarithms = 0.5 * np.log(alpha) - 0.25 * np.log(square + 2)
+    return float(2 * np.pi * (0.5 + square * logarithms))
+
+
+def printed_energy_response(alpha: float) -> float:
+    """Return the article's expression for the energy response, as printed."""
+    square = alpha * alpha
+    return float(0.5 + square * np.log(alpha) - 0.5 * square * np.log1p(square))
+
+
+Sampler: TypeAlias = Callable[[Array, Array, Array], tuple[Array, Array]]
+
+# Gauss's rule of this order on panels that grow by this factor, from a fiftieth of the peak's
+# width on, leaves an error of 1e-8; of order 8 it leaves 2e-7.
+_ORDER = 12
+_GROWTH = 2.5
+_FIRST_PANEL = 0.02
+# Where the integrand ends like a root the panels shrink to this, whose share is below rounding.
+_LEAST_PANEL = 1e-8
+# The peak is about 1/width², and divided by small cosines.
+_LEAST_WIDTH = 1e-140
+# Nearer to grazing rounding shows, and the limit is within 1e-6 from here on.
+_LEAST_COSINE = 1e-8
+# With some 500 nodes for each azimuth the intermediates of as many stay in the cache.
+_AZIMUTHS_AT_ONCE = 32
+
+
+@dataclass(frozen=True)
+class FurnaceModel:
+    """A BRDF with what the integration must know of it.
+
+    Parameters
+    ----------
+    brdf : callable
+        f(light, view), 1/sr, for unit vectors of shape (..., 3), which are broadcast.
+    width : float
+        About the angle, in radians, over which f falls from its peak.
+    around_mirror : bool
+        Whether the peak surrounds the mirror image of the viewer (Phong) or, in half vectors,
+        the normal (microfacets).
+    sample : callable
+        From (view, u₁, u₂) to light directions and their density, 1/sr.
+    """
+
+    brdf: Brdf
+    width: float
+    around_mirror: bool
+    sample: Sampler
+
+
+def directional_albedo(model: FurnaceModel, cosine: Array) -> Array:
+    """Integrate f cos θ_l over the hemisphere, to 1e-8; with V-cavities to 1e-6.
+
+    Parameters
+    ----------
+    model : FurnaceModel
+        The BRDF.
+    cosine : numpy.ndarray, shape (n,)
+        Cosines of the viewer with the normal, 0 < cos θ ≤ 1; at 0 the limit is approached.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        The share of the light that is reflected.
+
+    Raises
+    ------
+    MdfconvError
+        If the lobe is so narrow that no float holds its peak.
+    """
+    if model.width < _LEAST_WIDTH:
+        raise MdfconvError(f"a lobe of {model.width:.2g} rad is a mirror: its peak overflows")
+    integrate = _around_mirror if model.around_mirror else _around_normal
+    clipped = np.clip(cosine, _LEAST_COSINE, 1)
+    return np.array([integrate(model, float(value)) for value in clipped])
+
+
+def sampled_albedo(
+    model: FurnaceModel, cosine: Array, count: int, seed: int
+) -> tuple[Array, Array]:
+    """Estimate the directional albedo by drawing light directions.
+
+    Parameters
+    ----------
+    model : FurnaceModel
+        The BRDF.
+    cosine : numpy.ndarray, shape (n,)
+        Cosines of the viewer.
+    count : int
+        Directions for each, at least 2.
+    seed : int
+        Of the random numbers.
+
+    Returns
+    -------
+    albedo, standard_error : numpy.ndarray, shape (n,)
+        Means of f cos θ_l / p, and their standard errors.
+    """
+    random = np.random.default_rng(seed)
+    results = [_estimate(model, float(value), random.random((2, count))) for value in cosine]
+    albedo, error = np.array(results).reshape(-1, 2).T
+    return albedo, error
+
+
+def _estimate(model: FurnaceModel, cosine: float, numbers: Array) -> tuple[float, float]:
+    view = np.broadcast_to(_viewer(max(cosine, _LEAST_COSINE)), (*numbers[0].shape, 3))
+    light, density = model.sample(view, *numbers)
+    value = model.brdf(light, view) * light[..., 2]
+    weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
+    return float(weight.mean()), float(weight.std(ddof=1) / np.sqrt(weight.size))
+
+
+def _viewer(cosine: float) -> Array:
+    return np.array([np.sqrt((1 - cosine) * (1 + cosine)), 0.0, cosine])
+
+
+def _around_normal(model: FurnaceModel, cosine: float) -> float:
+    """Integrate over half vectors m = (t cos φ, t sin φ, 1)/√(1+t²), dω_l = 4 (v·m) dω_m.
+
+    The light is above the horizon for t < t_h(φ), the positive root of c t² − 2 s cos φ t − c.
+    """
+    sine = np.sqrt((1 - cosine) * (1 + cosine))
+    phi, phi_weight = _azimuths(cosine)
+    along = sine * np.cos(phi)
+    root = np.hypot(along, cosine)
+    # The root without the difference of two nearly equal numbers.
+    horizon = np.where(along > 0, (along + root) / cosine, cosine / (root + np.abs(along)))
+    kinks = _kinks(along, cosine)
+    total = 0.0
+    view = _viewer(cosine)
+    for rows in np.array_split(np.arange(phi.size), max(1, phi.size // _AZIMUTHS_AT_ONCE)):
+        t, weight = _from_zero(horizon[rows], kinks[rows], model.width)
+        theta = np.arctan(t)
+        m = direction(theta, phi[rows, None])
+        light = reflect(view, m)
+        jacobian = 4 * dot(m, view) * np.sin(theta) * np.square(np.cos(theta))
+        value = model.brdf(light, view) * light[..., 2]
+        total += float(phi_weight[rows] @ np.sum(value * jacobian * weight, axis=1))
+    # The two halves of the circle are alike.
+    return 2 * total
+
+
+def _azimuths(cosine: float) -> tuple[Array, Array]:
+    """Return φ on [0, π] and weights; at grazing the horizon turns within cos θ around π/2."""
+    steps = _growing(min(cosine, 1.0) * 0.2, np.pi / 2)
+    edges = np.concatenate([np.pi / 2 - steps[::-1], np.pi / 2 + steps[1:]])
+    return gauss_panels(edges, _ORDER)
+
+
+def _kinks(along: Array, cosine: float) -> Array:
+    """Return the t where light and viewer are level, and where V-cavities begin to mask either.
+
+    n·l = n·v at t = s cos φ/c, 2 (n·m)(n·v) = v·m at t = c/(s cos φ), and 2 (n·m)(n·l) = v·m
+    where tan 3θ_m = −c/(s cos φ); shape (n, 3).
+    """
+    slope = np.where(np.abs(along) > 0, along, 1e-300) / cosine
+    third = np.tan((np.pi - np.arctan2(1, slope)) / 3)
+    with np.errstate(over="ignore"):
+        return np.abs(np.stack([slope, 1 / slope, third], axis=1))
+
+
+def _from_zero(end: Array, kinks: Array, width: float) -> tuple[Array, Array]:
+    """Return nodes and weights on [0, end] for each row, dense around 0 on the scale of a width.
+
+    Panels end at the kinks, too.
+    """
+    largest = float(np.max(end))
+    edges = _growing(min(_FIRST_PANEL * width, largest), largest)
+    every = np.concatenate([np.broadcast_to(edges, (end.size, edges.size)), kinks], axis=1)
+    rows = np.sort(np.minimum(every, end[:, None]), axis=1)
+    return gauss_panels(rows, _ORDER)
+
+
+def _growing(first: float, end: float) -> Array:
+    """Return 0, then points that grow by a factor from the first to the end."""
+    count = max(1, int(np.ceil(np.log(end / first) / np.log(_GROWTH))))
+    return np.concatenate([[0.0], np.geomspace(first, end, count + 1)])
+
+
+def _around_mirror(model: FurnaceModel, cosine: float) -> float:
+    """Integrate over directions at θ_r from the mirror image, in rings cut by the horizon.
+
+    With φ from the azimuth of the mirror image upwards, cos θ_l = c cos θ_r + s sin θ_r cos φ.
+    """
+    sine = np.sqrt((1 - cosine) * (1 + cosine))
+    grazing = np.arctan2(cosine, sine)  # from the mirror image down to the horizon
+    theta, theta_weight = _rings(grazing, model.width)
+    ratio = cosine * np.cos(theta) / np.maximum(sine * np.sin(theta), 1e-300)
+    # Rings beyond the horizon end at this azimuth from the highest point.
+    last = np.arccos(np.clip(-ratio, -1, 1))
+    x, w = gauss_legendre(4 * _ORDER)
+    phi = 0.5 * last[:, None] * (1 + x)
+    weight = 0.5 * last[:, None] * w
+    view = _viewer(cosine)
+    mirrored = np.array([-view[0], 0.0, view[2]])
+    up, side = np.array([view[2], 0.0, view[0]]), np.array([0.0, 1.0, 0.0])
+    ring = np.cos(phi)[..., None] * up + np.sin(phi)[..., None] * side
+    light = np.cos(theta)[:, None, None] * mirrored + np.sin(theta)[:, None, None] * ring
+    value = model.brdf(light, view) * light[..., 2]
+    rings = np.sum(value * weight, axis=1) * np.sin(theta)
+    return float(2 * theta_weight @ rings)
+
+
+def _rings(grazing: float, width: float) -> tuple[Array, Array]:
+    """Return θ_r on [0, π/2] and weights, dense at 0, at π/2 and around the horizon.
+
+    At π/2 a lobe with a broken exponent ends like a root.
+    """
+    end = np.pi / 2
+    lobe = _growing(min(_FIRST_PANEL * width, end), end)
+    root = _growing(_LEAST_PANEL, end)
+    near = np.concatenate(
+        [grazing - lobe, grazing + lobe, grazing - root, grazing + root, end - root]
+    )
+    edges = np.unique(np.concatenate([lobe, near[(near > 0) & (near < end)]]))
+    return gauss_panels(edges, _ORDER)
+
+
+@dataclass(frozen=True)
+class _Definition:
+    """A BRDF by name: how it is built, the one option that it has, and its distribution."""
+
+    name: str
+    build: Callable[..., FurnaceModel]
+    option: str = ""
+    distribution: str = ""
+
+
+_REGISTRY: Registry[_Definition] = Registry("BRDF")
+# Why a BRDF does not take an option.
+_WITHOUT = {"normalizer": "{} has no normalizer", "masking": "the masking of {} is part of it"}
+
+
+def furnace_model(
+    name: str, parameter: float, *, normalizer: str | None = None, masking: str | None = None
+) -> FurnaceModel:
+    """Return a BRDF for the white-furnace test, its Fresnel term 1.
+
+    Parameters
+    ----------
+    name : str
+        One of `list_models`.
+    parameter : float
+        Exponent of the Phong BRDFs, the distribution's parameter of the others.
+    normalizer : str, optional
+        Of modified Phong: a name in `mdfconv.brdf.reflection.NORMALIZERS`; "usual" by default.
+    masking : str, optional
+        Of ggx and beckmann: a name in `mdfconv.brdf.microfacet.MASKINGS`; "correlated" by
+        default.
+
+    Raises
+    ------
+    MdfconvError
+        If a name is not known, does not apply, or the parameter is illegal.
+    """
+    definition = _REGISTRY[name]
+    options = {"normalizer": normalizer, "masking": masking}
+    chosen = {option: value for option, value in options.items() if value is not None}
+    for option in chosen:
+        if option != definition.option:
+            others = " and ".join(other.name for other in _REGISTRY if other.option == option)
+            reason = _WITHOUT[option].format(definition.name)
+            raise MdfconvError(reason, f"it can be chosen for {others}")
+    return definition.build(float(parameter), **chosen)
+
+
+def model_distribution(name: str) -> str:
+    """Return the distribution whose parameter a BRDF takes; "" for an exponent of Phong's."""
+    return _REGISTRY[name].distribution
+
+
+def list_models() -> list[str]:
+    """Return the names of the BRDFs."""
+    return _REGISTRY.names
+
+
+def _microfacets(name: str) -> Callable[..., FurnaceModel]:
+    def build(alpha: float, masking: str = "correlated") -> FurnaceModel:
+        surface = Microsurface(distribution(name), alpha)
+        shadow = MASKINGS[masking](surface)
+        return _facet_model(reflection.microfacet(surface, lossless, shadow), surface)
+
+    return build
+
+
+def _with_distribution(
+    name: str, mdf: str, brdf: Callable[[Microsurface, Fresnel], Brdf]
+) -> _Definition:
+    def build(parameter: float) -> FurnaceModel:
+        surface = Microsurface(distribution(mdf), parameter)
+        return _facet_model(brdf(surface, lossless), surface)
+
+    return _Definition(name, build, distribution=mdf)
+
+
+def _register(definition: _Definition) -> None:
+    """Register a BRDF, under all names of its distribution if it has that of one."""
+    name, owner = definition.name, definition.distribution
+    if owner == name:
+        mdf = distribution(name)
+        _REGISTRY.add(name, definition, mdf.aliases, mdf.meant_by)
+    else:
+        phong = distribution("blinn-phong").meant_by if not owner else {}
+        _REGISTRY.add(name, definition, meant_by=dict.fromkeys(phong, "phong"))
+
+
+def _facet_model(brdf: Brdf, surface: Microsurface) -> FurnaceModel:
+    """Return the model of a BRDF in half vectors, sampled by the facets of its surface."""
+
+    def sample(view: Array, u1: Array, u2: Array) -> tuple[Array, Array]:
+        if surface.has_visible_normals:
+            m = surface.visible_normals(view, u1, u2)
+            density = surface.visible_normal_density(view, m)
+        else:
+            m = surface.half_vectors(u1, u2)
+            density = surface.half_vector_density(m)
+        density = np.where(dot(view, m) > 0, density, 0)
+        return reflect(view, m), reflected_density(density, view, m)
+
+    width = float(surface.distribution.peak_alpha(surface.parameter))
+    return FurnaceModel(brdf, width, False, sample)
+
+
+def _original_phong(exponent: float) -> FurnaceModel:
+    return _mirror_model(phong.original(exponent), exponent)
+
+
+def _modified_phong(exponent: float, normalizer: str = "usual") -> FurnaceModel:
+    return _mirror_model(phong.modified(exponent, normalizer), exponent)
+
+
+def _mirror_model(brdf: Brdf, exponent: float) -> FurnaceModel:
+    """Return the model of a BRDF around the mirror image of the viewer."""
+
+    def sample(view: Array, u1: Array, u2: Array) -> tuple[Array, Array]:
+        axis = mirrored(view)
+        light = cosine_lobe(axis, exponent, u1, u2)
+        return light, cosine_lobe_density(axis, exponent, light)
+
+    return FurnaceModel(brdf, 1 / np.sqrt(exponent + 1), True, sample)
+
+
+for _definition in (
+    _Definition("ggx", _microfacets("ggx"), "masking", "ggx"),
+    _Definition("beckmann", _microfacets("beckmann"), "masking", "beckmann"),
+    _Definition("phong", _original_phong),
+    _Definition("modified-phong", _modified_phong, "normalizer"),
+    _with_distribution("smoothie", "smoothie", reflection.smoothie),
+    _with_distribution("smoothie-approx", "smoothie", reflection.smoothie_approx),
+    _with_distribution("ashikhmin-shirley", "ashikhmin-shirley", reflection.ashikhmin_shirley),
+):
+    _register(_definition)

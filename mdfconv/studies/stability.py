@@ -1,0 +1,489 @@
+"""The audit of hard cases: where formulas lose their digits, and what is left of them here.
+
+Exact values are stored, computed with mpmath at 60 digits from the printed formulas and for the
+very numbers that the types hold (``python -m tests.generate_stability`` writes them), and compared
+in decimal arithmetic, so that neither the references nor the comparison add an error of their own.
+"""
+
+from __future__ import annotations
+
+import csv
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from importlib.resources import files
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from mdfconv.conversion import convert, list_methods
+from mdfconv.conversion.methods import FormulaMethod, Method
+from mdfconv.distributions import Distribution, distribution, list_distributions
+from mdfconv.distributions.endpoint import Endpoint
+from mdfconv.distributions.equivalence import exact_route
+from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvWarning
+from mdfconv.fitting.metrics import metric_named
+
+DTYPES = (np.float64, np.float32, np.float16)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The worst of a group of hard cases, ours beside the printed expression.
+
+    Parameters
+    ----------
+    distribution : str
+        The distribution; of a conversion the source.
+    rule : str
+        ``"unit"`` or ``"normalized"`` for a kernel, else the method, ``"... and back"`` for a
+        round trip.
+    regime : str
+        What makes the cases hard.
+    dtype : str
+        Type of the input and of the result.
+    cases : int
+        The number of cases.
+    out_of_range : int
+        How many of them have an exact value that the type holds only as 0, a subnormal number
+        or infinity. They are right if the result is that; no error can be stated.
+    error : float or str
+        The largest relative error against the exact value; inf or NaN for a failure, empty where
+        there is no case.
+    error_in_eps : float or str
+        The same in units of the type's rounding, ``numpy.finfo(dtype).eps``; a correctly
+        rounded result has at most ½.
+    textbook : float or str
+        The largest relative error of the printed expression in plain NumPy, in the same type;
+        ``"NaN"`` or ``"inf"`` where it comes to that, and empty where nothing is printed.
+    worst : str
+        Where `error` is largest.
+    """
+
+    distribution: str
+    rule: str
+    regime: str
+    dtype: str
+    cases: int
+    out_of_range: int
+    error: float | str
+    error_in_eps: float | str
+    textbook: float | str
+    worst: str
+
+
+class Tally:
+    """Collects the errors of one group and makes the finding of them.
+
+    Parameters
+    ----------
+    distribution, rule, regime : str
+        As for `Finding`.
+    dtype : numpy.dtype
+        Type of the values.
+    """
+
+    def __init__(self, distribution: str, rule: str, regime: str, dtype: np.dtype) -> None:
+        self._group = distribution, rule, regime
+        self._dtype = dtype
+        self._ours: list[float] = []
+        self._textbook: list[float] = []
+        self._cases: list[str] = []
+        self._out_of_range = 0
+
+    def add(
+        self,
+        values: Array,
+        textbook: Array | None,
+        exact: Sequence[Decimal],
+        cases: Sequence[str],
+    ) -> None:
+        """Compare values of the group's type, and the printed expression's, with exact ones.
+
+        `cases` says in words what each of them is.
+        """
+        self._ours += relative_errors(values, exact)
+        if textbook is not None:
+            self._textbook += relative_errors(textbook, exact)
+        self._cases += cases
+        self._out_of_range += sum(not _in_range(value, self._dtype) for value in exact)
+
+    def finding(self) -> Finding:
+        """Return the worst."""
+        index = int(np.argmax(np.nan_to_num(self._ours, nan=np.inf)))
+        error = self._ours[index]
+        return Finding(
+            *self._group,
+            dtype=self._dtype.name,
+            cases=len(self._ours),
+            out_of_range=self._out_of_range,
+            error=two_digits(error),
+            error_in_eps=two_digits(error / float(np.finfo(self._dtype).eps)),
+            textbook=_worst_of_textbook(self._textbook),
+            worst=self._cases[index],
+        )
+
+
+class Tallies:
+    """The tallies of several groups, in the order in which they were first asked for."""
+
+    def __init__(self) -> None:
+        self._tallies: dict[tuple[str, str, str, str], Tally] = {}
+
+    def of(self, distribution: str, rule: str, regime: str, dtype: Any) -> Tally:
+        """Return the tally of a group."""
+        kind = np.dtype(dtype)
+        key = (distribution, rule, regime, kind.name)
+        return self._tallies.setdefault(key, Tally(distribution, rule, regime, kind))
+
+    def findings(self) -> Iterator[Finding]:
+        """Return the worst of each group."""
+        return (tally.finding() for tally in self._tallies.values())
+
+
+def no_references(audited: Distribution, dtype: Any) -> Iterator[Finding]:
+    """Yield the finding of a distribution for which no exact value is stored."""
+    group = (audited.name, "unit", "no stored references", np.dtype(dtype).name)
+    yield Finding(*group, cases=0, out_of_range=0, error="", error_in_eps="", textbook="", worst="")
+
+
+def relative_errors(values: Array, exact: Sequence[Decimal]) -> list[float]:
+    """Return |value − exact|/|exact| of each value, rounded only at the end.
+
+    Where the exact value is below the smallest normal number or above the largest number of
+    the type, the error is 0 if the value is so too and inf otherwise; NaN stays NaN.
+    """
+    return [_error(float(v), e, values.dtype) for v, e in zip(values, exact, strict=True)]
+
+
+def _error(value: float, exact: Decimal, dtype: np.dtype) -> float:
+    if np.isnan(value):
+        return np.nan
+    if not _in_range(exact, dtype):
+        limits = np.finfo(dtype)
+        small = float(limits.smallest_normal)
+        # The last rounding may lift a value just across the limit.
+        fits = 0 <= value <= small * 1.01 if exact < small else value >= 0.99 * float(limits.max)
+        return 0.0 if fits else np.inf
+    return np.inf if np.isinf(value) else float(abs(Decimal(value) - exact) / exact)
+
+
+def _in_range(exact: Decimal, dtype: np.dtype) -> bool:
+    limits = np.finfo(dtype)
+    return float(limits.smallest_normal) <= exact <= float(limits.max)
+
+
+def _worst_of_textbook(errors: list[float]) -> float | str:
+    if not errors:
+        return ""
+    worst = float(np.max(errors))
+    return two_digits(worst) if np.isfinite(worst) else str(worst).replace("nan", "NaN")
+
+
+def two_digits(value: float) -> float:
+    """Return a value rounded to two significant digits: an error's size is what matters."""
+    return float(f"{value:.1e}")
+
+
+def read_rows(name: str) -> list[dict[str, str]]:
+    """Return the rows of a file of reference values."""
+    text = files("mdfconv.studies").joinpath("data", name).read_text(encoding="utf-8")
+    return list(csv.DictReader(text.splitlines()))
+
+
+_Rows = list[dict[str, str]]
+
+
+def audit_kernels(chosen: Sequence[Distribution]) -> Iterator[Finding]:
+    """Yield the findings of the unit and the normalized forms.
+
+    Parameters
+    ----------
+    chosen : sequence of Distribution
+        What to audit. β is compared as stored: of a β beyond π/2, which float32's π/2 is, the
+        mirrored angle counts. The normalized forms are compared at β = 0; elsewhere they are a
+        multiple of the unit forms.
+
+    Yields
+    ------
+    Finding
+        One for each distribution, form, regime and type.
+    """
+    cases = {dtype: _read(dtype) for dtype in DTYPES}
+    for audited in chosen:
+        for dtype, by_name in cases.items():
+            rows = by_name.get(audited.name) or by_name.get(_same_function(audited), [])
+            yield from _findings(audited, rows, dtype) if rows else no_references(audited, dtype)
+
+
+def _read(dtype: type) -> dict[str, _Rows]:
+    rows = read_rows(f"kernels-{np.dtype(dtype).name}.csv")
+    return {name: list(group) for name, group in groupby(rows, lambda row: row["distribution"])}
+
+
+def _same_function(audited: Distribution) -> str:
+    """Return the name of the distribution that is this one in the same parameter, if any."""
+    equal = audited.equivalent
+    return equal.name if equal and equal.same_lobe and equal.same_parameter else ""
+
+
+def _findings(audited: Distribution, rows: _Rows, dtype: Any) -> Iterator[Finding]:
+    tallies = Tallies()
+    keys = ("form", "regime", "parameter", "gamma")
+    for (form, regime, parameter, gamma), group in groupby(
+        rows, lambda row: tuple(row[key] for key in keys)
+    ):
+        members = list(group)
+        beta = np.array([row["beta"] for row in members], dtype=dtype)
+        p, shape = dtype(parameter), audited
+        if audited.second_parameter:
+            shape = audited.with_gamma(float(dtype(gamma or audited.gamma)))
+        evaluate = shape.unit if form == "unit" else shape.normalized
+        where = f"{audited.parameter.symbol} = {parameter}" + (f", γ = {gamma}" if gamma else "")
+        # float16 overflows where the normalized form of a mirror-smooth surface exceeds 65504.
+        with np.errstate(over="ignore"):
+            values = evaluate(beta, p)
+        tallies.of(audited.name, form, regime, dtype).add(
+            values,
+            printed_form(shape, form, beta, p),
+            [Decimal(row["value"]) for row in members],
+            [f"β = {row['beta']}, {where}" for row in members],
+        )
+    return tallies.findings()
+
+
+def printed_form(shape: Distribution, form: str, beta: Array, parameter: Any) -> Array:
+    """Return the printed unit form, or the printed normalized form at the normal.
+
+    Parameters
+    ----------
+    shape : Distribution
+        The distribution, with its γ if it has one.
+    form : str
+        ``"unit"`` or ``"normalized"``.
+    beta : numpy.ndarray
+        Angles, radians; 0 for the normalized form.
+    parameter : numpy scalar
+        The parameter, in the type of the angles.
+    """
+    printed = shape.printed
+    arguments = [parameter] + [beta.dtype.type(shape.gamma)] * bool(shape.second_parameter)
+    with np.errstate(all="ignore"):
+        # Where the maximum is off the normal, D̄ is not D(β)/D(0): that is 1 at the normal.
+        off_axis = form == "normalized" and shape.mode(np.asarray(float(parameter))) > 0
+        value = np.ones_like(beta) if off_axis else printed.unit(beta, *arguments)
+        return value if form == "unit" else value * printed.at_normal(*arguments)
+
+
+# The computation is in float64 throughout: float32 rounds the input and the result.
+_DTYPES = (np.float64, np.float32)
+# What the stored fits keep.
+_FIT_METRICS = ("unit", "energy")
+# Methods of which one direction undoes the other, for every pair, with the printed expressions
+# that they go through.
+_INVERTIBLE = {"half-angle": ("cosine", "from_cosine"), "peak": ("peak_alpha", "from_peak_alpha")}
+_ENCODED = {"mirror-smooth": ("1e-08", "1e-06", "1e-04"), "rough": ("0.25", "0.5", "1")}
+_ENCODED_EXPONENTS = {"mirror-smooth": ("1000", "10000", "60000"), "rough": ("4", "10", "100")}
+
+# Columns of conversions.csv that are not a target's.
+_KEYS = ("method", "source", "regime", "gamma", "value")
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Values at one end of the source's range, float32's, and their exact results in a target."""
+
+    source: Distribution
+    target: Distribution
+    regime: str
+    values: list[str]
+    exact: list[Decimal]
+
+    def of_type(self, dtype: Any) -> Array:
+        return np.array(self.values, dtype=np.float32).astype(dtype)
+
+    @property
+    def cases(self) -> list[str]:
+        return [f"{value} → {self.target.name}" for value in self.values]
+
+
+def audit_conversions(chosen: Sequence[Distribution]) -> Iterator[Finding]:
+    """Yield the findings of all conversions from the chosen distributions.
+
+    Parameters
+    ----------
+    chosen : sequence of Distribution
+        The sources.
+
+    Yields
+    ------
+    Finding
+        One for each source, method, end of the range and type. A round trip is compared with
+        where it started: where a conversion is nearly constant, no stored result leads back.
+    """
+    formulas, fits = read_rows("conversions.csv"), read_rows("fits.csv")
+    for source in chosen:
+        fitted = [row for row in fits if row["source"] == source.name]
+        for method in list_methods():
+            rows = [
+                row
+                for row in formulas
+                if (row["method"], row["source"]) == (method.name, source.name)
+            ]
+            yield from _formula(method, _formula_batches(source, rows))
+            if method.follows_metric:
+                yield from _fits(method, source, fitted)
+        yield from _encodings(source)
+
+
+def _formula_batches(source: Distribution, rows: _Rows) -> Iterator[_Batch]:
+    for (regime, gamma), group in groupby(rows, lambda row: (row["regime"], row["gamma"])):
+        members = list(group)
+        for name in [column for column in members[0] if column not in _KEYS]:
+            answered = [row for row in members if row[name]]
+            if answered:
+                yield _Batch(
+                    _with_gamma(source, gamma),
+                    _with_gamma(distribution(name), gamma),
+                    regime,
+                    [row["value"] for row in answered],
+                    [Decimal(row[name]) for row in answered],
+                )
+
+
+def _with_gamma(end: Distribution, gamma: str) -> Distribution:
+    return end.with_gamma(float(gamma)) if end.second_parameter else end
+
+
+def _converted(values: Array, source: Distribution, target: Distribution, method: Method) -> Any:
+    """Convert hard cases, of which nobody is to be warned."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MdfconvWarning)
+        return convert(values, Endpoint(source), Endpoint(target), method.name)
+
+
+def _formula(method: Method, batches: Iterator[_Batch]) -> Iterator[Finding]:
+    forward, back = Tallies(), Tallies()
+    for batch in batches:
+        source, target = batch.source, batch.target
+        comes_back = method.name in _INVERTIBLE or exact_route(source, target) is not None
+        for dtype in _DTYPES:
+            values = batch.of_type(dtype)
+            ours = _converted(values, source, target, method)
+            printed = printed_conversion(method, source, target, values)
+            group = batch.regime, dtype
+            forward.of(source.name, method.name, *group).add(
+                ours, printed, batch.exact, batch.cases
+            )
+            if comes_back:
+                if printed is not None:
+                    printed = printed_conversion(method, target, source, printed)
+                back.of(source.name, f"{method.name} and back", *group).add(
+                    _converted(ours, target, source, method),
+                    printed,
+                    [Decimal(float(value)) for value in values],
+                    [f"{case} → {source.name}" for case in batch.cases],
+                )
+    yield from forward.findings()
+    yield from back.findings()
+
+
+def printed_conversion(
+    method: Method, source: Distribution, target: Distribution, values: Array
+) -> Array | None:
+    """Return what the printed formulas give in the type of the values; None if none is printed.
+
+    Parameters
+    ----------
+    method : Method
+        The method.
+    source, target : Distribution
+        The pair, with their γ.
+    values : numpy.ndarray
+        Parameters of the source.
+    """
+    with np.errstate(all="ignore"):
+        if isinstance(method, FormulaMethod):
+            # It holds the formulas as printed.
+            result = method.convert(values, source, target, metric_named("unit"))
+        else:
+            first, last = (
+                getattr(end.printed, name)
+                for end, name in zip((source, target), _INVERTIBLE[method.name], strict=True)
+            )
+            if first is None or last is None:
+                return None
+            result = last(first(values, *_gammas(source, values)), *_gammas(target, values))
+    return np.asarray(result).astype(values.dtype)
+
+
+def _gammas(end: Distribution, values: Array) -> list[Array]:
+    return [np.full_like(values, end.gamma)] if end.second_parameter else []
+
+
+def _fits(method: Method, source: Distribution, rows: _Rows) -> Iterator[Finding]:
+    tallies = Tallies()
+    for (name, regime), group in groupby(rows, lambda row: (row["target"], row["regime"])):
+        members = list(group)
+        target = distribution(name)
+        for metric in map(metric_named, _FIT_METRICS):
+            if not method.covers(source, target, metric):
+                continue
+            exact = [Decimal(row[metric.name]) for row in members]
+            batch = _Batch(source, target, regime, [row["value"] for row in members], exact)
+            for dtype in _DTYPES:
+                ours = convert(batch.of_type(dtype), source.name, name, method.name, metric=metric)
+                tallies.of(source.name, f"{method.name} {metric.name}", regime, dtype).add(
+                    ours, None, exact, batch.cases
+                )
+    yield from tallies.findings()
+
+
+def _encodings(source: Distribution) -> Iterator[Finding]:
+    tallies = Tallies()
+    for encoding in source.encodings:
+        label = f"{source.name}:{encoding.name}"
+        smooth = source.parameter.larger_is_smoother
+        for regime, texts in (_ENCODED_EXPONENTS if smooth else _ENCODED).items():
+            for dtype in _DTYPES:
+                values = np.array(texts, dtype=dtype)
+                tallies.of(source.name, f"{encoding.name} and back", regime, dtype).add(
+                    convert(convert(values, source.name, label), label, source.name),
+                    None,
+                    [Decimal(float(value)) for value in values],
+                    [f"{text} → {encoding.name} → {source.parameter.symbol}" for text in texts],
+                )
+    yield from tallies.findings()
+
+
+_PARTS = {"kernels": audit_kernels, "conversions": audit_conversions}
+
+
+def audit(names: Sequence[str] = (), part: str | None = None) -> Iterator[Finding]:
+    """Yield the worst error of every group of hard cases.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names or aliases of the distributions to audit, of conversions the sources; all if empty.
+    part : str, optional
+        ``"kernels"`` or ``"conversions"``; both if not given.
+
+    Yields
+    ------
+    Finding
+        First of the kernels (float64, float32, float16), then of the conversions (float64,
+        float32). A distribution without stored references has a finding without cases.
+
+    Raises
+    ------
+    MdfconvError
+        If a name is not known.
+    """
+    chosen = list(dict.fromkeys(map(distribution, names))) or list_distributions()
+    for name, findings in _PARTS.items():
+        if part in (None, name):
+            yield from findings(chosen)

@@ -1,0 +1,133 @@
+"""A distribution or a metric that is registered later: benchmark, audit and pages know it."""
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mdfconv
+from mdfconv.distributions import distribution, one_parameter_distributions
+from mdfconv.distributions.blinn_phong import BlinnPhong
+from mdfconv.distributions.gtr import GTR
+from mdfconv.fitting import metrics
+from mdfconv.fitting.metrics import metric_named
+from mdfconv.fitting.metrics.base import Energy
+from mdfconv.recommend import recommend
+from mdfconv.studies.bench import page
+from mdfconv.studies.bench.figure import draw
+from mdfconv.studies.bench.measure import Task, measure
+from mdfconv.studies.stability import audit
+from mdfconv.timing import Sizes
+
+TINY = Sizes(angles=512, conversions=64, fits=4, loop=2, rounds=1, largest=100, patience=0.05)
+
+
+class Cosine(BlinnPhong):
+    """A form that takes no tangent."""
+
+    name = "cosine-power"
+    encodings = ()
+    aliases = ()
+    functions = ("log1p", "exp")
+    map_variables = None
+
+
+class Generalized(GTR):
+    name = "generalized"
+    aliases = ()
+
+
+class Projected(Energy):
+    name = "projected"
+
+
+def ignore(steps):
+    pass
+
+
+@pytest.fixture(scope="module")
+def newcomers():
+    """Register them for these tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (mdfconv.distributions, metrics):
+            patch.setattr(module, "_REGISTRY", copy.deepcopy(module._REGISTRY))
+        mdfconv.distributions.register(Cosine())
+        mdfconv.distributions.register(Generalized())
+        metrics.register_metric(Projected)
+        yield
+
+
+@pytest.fixture(scope="module")
+def measurements(newcomers):
+    ends = distribution("beckmann"), distribution("cosine-power")
+    candidates = tuple(one_parameter_distributions())
+    return measure(Task(ends[0], np.array([0.2, 0.05]), candidates, *ends, TINY), ignore)
+
+
+def test_benchmark(measurements):
+    kernels = {row.distribution: row.functions for row in measurements.kernels}
+    assert kernels["cosine-power"] == "log1p exp"
+    assert kernels["generalized"] == kernels["ggx"] == "tan copy"
+    substitutes = {row.distribution: row for row in measurements.substitutes}
+    assert substitutes["cosine-power"].parameter == pytest.approx(
+        substitutes["blinn-phong"].parameter
+    )
+    methods = {(row.method, row.metric) for row in measurements.methods}
+    assert ("fit", "projected") in methods
+    assert "fast" not in {method for method, _ in methods}
+    said = page.sentences(measurements)
+    assert sum("cosine-power" in sentence for sentence in said["substitutes"]) >= 2
+    assert "| projected |" in page.markdown_page(measurements)
+    assert draw(measurements).startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["ggx"], "the rational forms take ggx"),
+        (["beckmann"], "the forms with an exponential or a power take beckmann"),
+        (["cosine-power"], "the forms with an exponential or a power take cosine-power"),
+        (["ggx", "beckmann"], "being rational buys"),
+    ],
+)
+def test_sentences_of_any_set(measurements, names, words):
+    some = replace(
+        measurements,
+        substitutes=[row for row in measurements.substitutes if row.distribution in names],
+        kernels=[row for row in measurements.kernels if row.distribution in names],
+    )
+    said = page.sentences(some)["substitutes"]
+    assert words in said[0]
+    # What a tangent costs is known from a form that takes nothing else.
+    assert sum("no tangent" in sentence for sentence in said) == 2 * ("ggx" in names)
+
+
+def test_recommendation(newcomers):
+    for source, gamma in (("cosine-power", None), ("generalized", 3.0)):
+        surface = distribution(source)
+        surface = surface.with_gamma(gamma) if gamma else surface
+        value = surface.parameter.typical_value
+        candidates = one_parameter_distributions()
+        answer = recommend(surface, value, candidates, metric_named("projected"), 1e-9)
+        rows = {row["distribution"]: row for row in answer.records()}
+        assert rows[source]["max_error"] == 0
+        assert rows[source]["method"] == "none"
+        assert len(rows) == len(candidates)
+
+
+def test_audit_without_references(newcomers):
+    findings = list(audit(["cosine-power"]))
+    assert [finding.dtype for finding in findings] == ["float64", "float32", "float16"]
+    for finding in findings:
+        assert (finding.regime, finding.cases) == ("no stored references", 0)
+        assert finding.error == finding.error_in_eps == finding.textbook == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "same"), [("generalized", "ggx"), ("ashikhmin-shirley", "blinn-phong")]
+)
+def test_audit_with_the_references_of_the_same_lobe(newcomers, name, same):
+    ours, theirs = (list(audit([one], "kernels")) for one in (name, same))
+    assert [(f.regime, f.cases) for f in ours] == [(f.regime, f.cases) for f in theirs]
+    assert all(f.error_in_eps < 40 or f.regime == "tail" for f in ours)

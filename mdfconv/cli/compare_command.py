@@ -234,7 +234,7 @@ def _targets(source: Endpoint, names: list[str]) -> list[Endpoint]:
     """Return what takes the source's place: what is named, or the paper's other distributions."""
     from mdfconv.distributions import one_parameter_distributions
     from mdfconv.distributions.endpoint import one_parameter_endpoint
-    from mdfconv.studies.error_curves import PAPER_SETS
+    from mdfconv.render.comparison import PAPER_SETS
 
     if names and not _takes_every(names):
         ends = [asked_endpoint(name) for name in names]

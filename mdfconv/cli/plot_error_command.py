@@ -120,7 +120,8 @@ def _sets(
     ends: Sequence[Endpoint],
 ) -> dict[str, dict[str, float]]:
     """Return the parameters of each figure by its name."""
-    from mdfconv.studies.error_curves import DRAWN, PAPER_SETS, parameters_for
+    from mdfconv.render.comparison import DRAWN, PAPER_SETS
+    from mdfconv.studies.error_curves import parameters_for
 
     names = list(dict.fromkeys(end.distribution.name for end in ends))
     if m_b:

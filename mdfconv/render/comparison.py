@@ -28,8 +28,21 @@ from mdfconv.render.sphere import (
     highlight_extent,
     radiance,
 )
-from mdfconv.studies.error_curves import DRAWN, PAPER_SETS, lobe_extent
 
+# Sawicki 2021, captions of Figures 1 and 2.
+PAPER_SETS: Mapping[str, Mapping[str, float]] = {
+    "fig1": {
+        "beckmann": 0.4, "blinn-phong": 10, "gauss": 0.4364, "ggx": 0.4456, "sawicki": 12.04,
+        "schlick": 0.4,
+    },
+    "fig2": {
+        "beckmann": 0.04464, "blinn-phong": 1000, "gauss": 0.04471, "ggx": 0.05354,
+        "sawicki": 1174.3, "schlick": 0.04464,
+    },
+}  # fmt: skip
+DRAWN = ("blinn-phong", "gauss", "ggx", "sawicki", "schlick")
+# 4.8 β_half is 4 m_B for Beckmann, the paper's habit.
+_HALF_WIDTHS = 4.8
 _SECTION_POINTS = 401
 _SIZES = (16, 4096)  # pixels a side: from where the sphere shows up to what memory holds
 _REC_709 = np.array([0.2126, 0.7152, 0.0722])  # luminance of linear R, G, B (ITU-R BT.709)
@@ -242,6 +255,12 @@ class Comparison:
         for rule, renderings in self.rows.items():
             columns |= {f"{shown.name}, {rule}": shown.section for shown in renderings}
         return list(columns), rounded_rows(columns)
+
+
+def lobe_extent(distribution: Distribution, parameter: Array) -> Array:
+    """Return the angle up to which the figures show a lobe: 4.8 β_half, at most π/2, radians."""
+    extent = _HALF_WIDTHS * distribution.half_width(parameter)
+    return np.where(extent <= np.pi / 2, extent, np.pi / 2)
 
 
 @dataclass(frozen=True)

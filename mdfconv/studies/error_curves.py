@@ -9,28 +9,15 @@ from typing import Any
 import numpy as np
 
 from mdfconv.conversion import convert
-from mdfconv.distributions import Distribution, distribution
+from mdfconv.distributions import distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
 from mdfconv.output.figures import encoded, line_style, new_figure
 from mdfconv.output.records import csv_text, rounded_rows
+from mdfconv.render.comparison import lobe_extent
 
-# Sawicki 2021, captions of Figures 1 and 2.
-PAPER_SETS: Mapping[str, Mapping[str, float]] = {
-    "fig1": {
-        "beckmann": 0.4, "blinn-phong": 10, "gauss": 0.4364, "ggx": 0.4456, "sawicki": 12.04,
-        "schlick": 0.4,
-    },
-    "fig2": {
-        "beckmann": 0.04464, "blinn-phong": 1000, "gauss": 0.04471, "ggx": 0.05354,
-        "sawicki": 1174.3, "schlick": 0.04464,
-    },
-}  # fmt: skip
-DRAWN = ("blinn-phong", "gauss", "ggx", "sawicki", "schlick")
 _MOST_POINTS = 1_000_000
-# 4.8 β_half is 4 m_B for Beckmann, the paper's habit.
-_HALF_WIDTHS = 4.8
 
 
 @dataclass(frozen=True)
@@ -81,12 +68,6 @@ class Curves:
                 }
             )
         return rows
-
-
-def lobe_extent(distribution: Distribution, parameter: Array) -> Array:
-    """Return the angle up to which the figures show a lobe: 4.8 β_half, at most π/2, radians."""
-    extent = _HALF_WIDTHS * distribution.half_width(parameter)
-    return np.where(extent <= np.pi / 2, extent, np.pi / 2)
 
 
 def parameters_for(

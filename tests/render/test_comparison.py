@@ -14,7 +14,14 @@ from mdfconv.distributions import distribution, one_parameter_distributions
 from mdfconv.distributions.dialects import DIALECTS, Specular
 from mdfconv.distributions.endpoint import encodings_of, endpoint
 from mdfconv.fitting.metrics import metric_named
-from mdfconv.render.comparison import PAPER_FIGURES, ConversionRule, Scene, compare, default_rules
+from mdfconv.render.comparison import (
+    DRAWN,
+    PAPER_FIGURES,
+    ConversionRule,
+    Scene,
+    compare,
+    default_rules,
+)
 from mdfconv.render.comparison_figure import _diverging, draw_comparison
 from mdfconv.render.sphere import (
     LIGHT,
@@ -26,7 +33,6 @@ from mdfconv.render.sphere import (
     highlight,
     radiance,
 )
-from mdfconv.studies.error_curves import DRAWN
 from tests.cli.runner import run, run_on_terminal
 
 NAMES = ["beckmann", "blinn-phong", "gauss", "ggx", "sawicki", "schlick", "smoothie", "gtr"]

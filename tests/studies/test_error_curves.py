@@ -8,7 +8,8 @@ import pytest
 from PIL import Image
 
 from mdfconv.fitting.metrics import metric_named
-from mdfconv.studies.error_curves import PAPER_SETS, curves
+from mdfconv.render.comparison import PAPER_SETS
+from mdfconv.studies.error_curves import curves
 from tests.cli.runner import run
 
 # Largest |error| in per cent, computed independently for the formula sheet.

@@ -9,11 +9,11 @@ from mdfconv.conversion import convert
 from mdfconv.fitting.metrics import list_metrics, metric_named
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text, markdown_text
-from mdfconv.render.comparison import PAPER_FIGURES, Scene, default_rules
+from mdfconv.render.comparison import PAPER_FIGURES, PAPER_SETS, Scene, default_rules
 from mdfconv.render.comparison import compare as compare_pictures
 from mdfconv.render.comparison_figure import draw_comparison
 from mdfconv.studies.closed_forms import refit_rows
-from mdfconv.studies.error_curves import PAPER_SETS, curves, draw_errors
+from mdfconv.studies.error_curves import curves, draw_errors
 from mdfconv.studies.report.artefact import Artefact
 from mdfconv.studies.table2 import AGREEMENT, COLUMNS, compare, fit_table, paper_sweep
 

@@ -102,9 +102,9 @@ def command(
 def _comparison() -> tuple[list[str], list[dict[str, Any]], str]:
     from dataclasses import asdict
 
-    from mdfconv.studies.table2 import compare
+    from mdfconv.studies.table2 import printed_cells
 
-    rows = [asdict(cell) for cell in compare()]
+    rows = [asdict(cell) for cell in printed_cells()]
     agreeing = sum(row["agrees"] for row in rows)
     title = f"Table 2 of Sawicki 2021: {agreeing} of {len(rows)} cells within 4e-4"
     return list(rows[0]), rows, title

@@ -22,15 +22,12 @@ def command(
 
     mdfconv report --output /tmp/mdfconv-report
     """
-    from mdfconv.studies.report.build import COUNT, ELSEWHERE, FILES, build, report_files
+    from mdfconv.studies.report import INDEX, PAGES, build
 
     folder = check_folder(context, output)
-    outputs = Outputs(*(folder / name for name in FILES), force=force)
-    artefacts = []
-    with progress("Report", COUNT) as advance:
-        for artefact in build():
-            artefacts.append(artefact)
-            advance(1)
-    present = [name for name in ELSEWHERE if (folder / name).exists()]
-    files = report_files(artefacts, present)
+    names = [name for page in PAGES for name in page.files] + [INDEX]
+    # What exists is found before minutes of work.
+    outputs = Outputs(*(folder / name for name in names), force=force)
+    with progress("Report", len(PAGES)) as advance:
+        files = build(advance)
     outputs.write({folder / name: content for name, content in files.items()})

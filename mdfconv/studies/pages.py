@@ -6,8 +6,17 @@ figure ``error``, with Python's rules of format; a table is the figure ``{table}
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from string import Formatter
+from typing import NamedTuple
+
+
+class Contents(NamedTuple):
+    """The contents of the files of a page, and the figures of it that the index has."""
+
+    files: Sequence[str | bytes]
+    figures: Mapping[str, object]
 
 
 def fill(name: str, **figures: object) -> str:

@@ -151,7 +151,7 @@ def fit_table(
     return rows
 
 
-def compare(ours: list[Row] | None = None) -> Iterator[Cell]:
+def printed_cells(ours: list[Row] | None = None) -> Iterator[Cell]:
     """Yield the 153 printed parameters and errors beside ours, fitted anew if not given."""
     ours = fit_table(*paper_sweep(), Unit()) if ours is None else ours
     for printed, row in zip(printed_rows(), ours, strict=True):

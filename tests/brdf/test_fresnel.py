@@ -18,7 +18,7 @@ from mdfconv.brdf.fresnel import (
 )
 from mdfconv.errors import MdfconvError
 from mdfconv.studies.fresnel import fit, rescaled
-from mdfconv.studies.report.fresnel_page import error_rows, fresnel_page
+from mdfconv.studies.fresnel_page import error_rows, fresnel
 from tests.cli.runner import run
 
 mp.mp.dps = 60
@@ -141,10 +141,10 @@ def test_the_fit_is_the_minimum(ior, mu, sigma):
 
 
 def test_the_page():
-    page = fresnel_page()
-    assert set(page.files) == {"fresnel.md", "fresnel.csv", "fresnel.png"}
-    assert "within 0.6 %" in page.agreement
-    rows = list(csv.DictReader(page.files["fresnel.csv"].decode().splitlines()))
+    (page, table, _), figures = fresnel()
+    assert "within 0.52% of the printed" in page
+    assert figures["off"] == pytest.approx(0.0052, abs=5e-5)
+    rows = list(csv.DictReader(table.splitlines()))
     middle = rows[50]
     assert float(middle["cosine"]) == 0.5
     assert float(middle["(1-x)^5"]) == 0.5**5

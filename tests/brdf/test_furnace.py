@@ -16,7 +16,7 @@ from mdfconv.studies.furnace import (
     list_models,
     sampled_albedo,
 )
-from mdfconv.studies.report.furnace_page import furnace_page
+from mdfconv.studies.furnace_page import furnace
 from tests.cli.runner import run
 
 COSINES = np.array([0.0, 1e-6, 1e-3, 0.03, 0.2, 0.5, 0.77, 0.99, 1.0])
@@ -148,17 +148,17 @@ def test_energy_response_by_quadrature(alpha):
 
 
 def test_the_page_states_what_its_data_say():
-    page = furnace_page()
-    rows = list(csv.DictReader(page.files["furnace.csv"].decode().splitlines()))
-    text = " ".join(page.files["furnace.md"].decode().split())
+    (page, table, _), figures = furnace()
+    rows = list(csv.DictReader(table.splitlines()))
+    text = " ".join(page.split())
     smooth = float(rows[-1]["Smoothie: smoothie 0.1"])
-    assert f"the exact form returns {smooth:.3g} to a viewer along the normal for α = 0.1" in text
+    assert f"For α = 0.1 its exact form returns {smooth:.3f} along the normal" in text
     article = smooth * np.pi / (4 + 0.1**2)
-    assert f"here {article:.3g}, and loses 21% of the light" in text
+    assert "loses at least 1 − π/4 of the light, 21%" in text
     assert 1 - article > 0.21
     unmasked = float(rows[2]["GGX: none"])
-    assert f"at cos θ = 0.1 GGX without it returns {unmasked:.2g}" in text
-    assert "within 1e-" in page.agreement
+    assert f"without it GGX makes light, {unmasked:.2g} at cos θ = 0.1" in text
+    assert figures["error"] < 1e-14
 
 
 def test_command(tmp_path):

@@ -23,8 +23,8 @@ from PIL import Image
 import mdfconv
 from mdfconv.cli import app
 from mdfconv.output import files as output_files
-from mdfconv.studies.report import build as report
-from mdfconv.studies.report.artefact import Artefact
+from mdfconv.studies import report
+from mdfconv.studies.pages import Contents
 from tests.cli.runner import run_here as run
 from tests.light.maps import room, write_map
 
@@ -111,18 +111,17 @@ CASES = {
 }  # fmt: skip
 
 
-def one_artefact():
-    return Artefact({"a.md": b"new"}, "", "", "")
+def one_page():
+    return Contents(["new"], {})
 
 
 @pytest.fixture(autouse=True)
 def _here(tmp_path, monkeypatch):
     """A folder with all inputs, in which the commands run; what would take long is not computed."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(report, "_ARTEFACTS", {one_artefact: ("a.md",)})
-    monkeypatch.setattr(report, "_LONGEST", ())
+    monkeypatch.setattr(report, "PAGES", [report.Page(one_page, ("a.md",))])
+    monkeypatch.setattr(report, "fill", lambda name, **figures: name)
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
-    monkeypatch.setattr(report, "FILES", ("a.md", "README.md"))
     monkeypatch.setattr(Figure, "savefig", lambda figure, file, **_: file.write(b"drawn"))
     monkeypatch.setattr("mdfconv.render.page.comparison_page", lambda *_: b"page")
     monkeypatch.setattr("mdfconv.studies.bench.measure.measure", lambda *_: None)

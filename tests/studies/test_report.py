@@ -1,19 +1,20 @@
 """The report folder: what is committed is what the code makes, and the same twice."""
 
 import multiprocessing
-import shutil
+import os
 from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
 
 from mdfconv.errors import MdfconvError
-from mdfconv.studies.report import build as report
-from mdfconv.studies.report.build import ELSEWHERE, FILES, build, report_files
-from mdfconv.studies.report.paper_pages import closed_forms, other_metrics, table2
+from mdfconv.studies.paper_pages import closed_forms, table2, table2_by_metric
+from mdfconv.studies.report import INDEX, PAGES, Page, build, made
 from tests.cli.runner import run
 
 REPORTS = Path(__file__).parents[2] / "reports"
+# What other commands make.
+ELSEWHERE = ("speed-error.md", "speed-error.csv", "speed-error.png", "comparison.png")
 
 pytestmark = pytest.mark.slow
 
@@ -22,18 +23,18 @@ pytestmark = pytest.mark.slow
 def folder(tmp_path_factory):
     """The report, built here, without its pictures: the command draws them."""
     path = tmp_path_factory.mktemp("report")
-    for name in ELSEWHERE:
-        shutil.copy(REPORTS / name, path)
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "cpu_count", lambda: 1)
         patch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"a picture"))
-        for name, content in report_files(list(build(processes=1)), ELSEWHERE).items():
+        for name, content in build(lambda pages: None).items():
             (path / name).write_bytes(content)
     return path
 
 
 def test_report_is_what_the_code_makes(folder):
     names = {path.name for path in folder.iterdir()}
-    assert names == {path.name for path in REPORTS.iterdir()} == {*FILES, *ELSEWHERE}
+    assert names == {path.name for path in REPORTS.iterdir()} - set(ELSEWHERE)
+    assert names == {INDEX, *(name for page in PAGES for name in page.files)}
     for path in sorted(folder.iterdir()):
         if path.suffix in (".csv", ".md"):
             # The orders of magnitude of rounding errors depend on the processor.
@@ -63,12 +64,7 @@ def test_report_is_the_same_twice(folder, tmp_path):
     files = [path for path in tmp_path.iterdir() if path.suffix in (".csv", ".md", ".html")]
     assert len(files) > 15
     for path in files:
-        if path.name != "README.md":
-            assert path.read_bytes() == (folder / path.name).read_bytes()
-    # The index here lists what another command measured, too.
-    lines = (folder / "README.md").read_text().splitlines()
-    own = [line for line in lines if not any(f"[{name}]" in line for name in ELSEWHERE)]
-    assert (tmp_path / "README.md").read_text().splitlines() == own
+        assert path.read_bytes() == (folder / path.name).read_bytes()
 
 
 def test_a_folder_that_cannot_be(tmp_path):
@@ -82,21 +78,19 @@ def refuse():
 
 
 @pytest.mark.parametrize("processes", [1, 2])
-def test_an_artefact_that_cannot_be(processes, monkeypatch):
-    monkeypatch.setattr(report, "_LONGEST", ())
-    monkeypatch.setattr(report, "_ARTEFACTS", (table2, refuse, closed_forms))
-    made = build(processes)
-    assert "table2.csv" in next(made).files
+def test_a_page_that_cannot_be(processes):
+    pages = made([Page(table2, ()), Page(refuse, ()), Page(closed_forms, ())], processes)
+    assert "# Table 2" in next(pages).files[0]
     with pytest.raises(MdfconvError, match="no such light; there are two") as caught:
-        next(made)
+        next(pages)
     assert caught.value.argument == "light"
     assert multiprocessing.active_children() == []
 
 
-def test_processes_take_turns_and_keep_the_order(monkeypatch):
-    monkeypatch.setattr(report, "_LONGEST", (table2,))
-    monkeypatch.setattr(report, "_ARTEFACTS", (other_metrics, table2))
-    made = list(build(2))
-    assert [next(iter(artefact.files)) for artefact in made] == ["table2-energy.csv", "table2.csv"]
-    index = report_files(made, [])["README.md"].decode()
-    assert index.index("table2-energy.csv") < index.index("[table2.csv]")
+def test_processes_take_turns_and_keep_the_order():
+    contents = made([Page(table2_by_metric, ()), Page(table2, (), slow=True)], 2)
+    titles = [each.files[0].splitlines()[0] for each in contents]
+    assert titles == [
+        "# Table 2 under the energy metric",
+        "# Table 2 of Sawicki 2021, recomputed",
+    ]

@@ -1,0 +1,152 @@
+"""What importers make of a Wavefront exponent, and what it should be."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+
+from mdfconv.distributions.endpoint import endpoints
+from mdfconv.distributions.evaluation import Array
+from mdfconv.fitting.metrics import metric_named
+from mdfconv.formula import SearchProblem, cheapest
+from mdfconv.output.figures import PAGE, encoded, new_figure
+from mdfconv.output.records import csv_text, markdown_text, rounded_rows
+from mdfconv.scene.encodings import EXPONENTS, encoding_records
+from mdfconv.scene.shininess import (
+    IMPORTERS,
+    ROUGHNESS,
+    SHININESS,
+    error_of,
+    importer_roughness,
+    roughness_of,
+)
+from mdfconv.studies.pages import Contents, fill
+
+_EXPONENTS = np.geomspace(1, 1e4, 81)
+# Of the roughness that is asked for.
+_ABOUT_RIGHT = 0.1
+_MIRROR = 1e-9
+_LIGHT = "environment"
+_OURS = (_LIGHT, "energy", "display")
+# Above the rules, in black and grey.
+_OUR_STYLES = {
+    "environment": ("#000000", "-"),
+    "energy": ("#666666", (0, (5, 1))),
+    "display": ("#666666", ":"),
+}
+_DASHES = ("-", (0, (6, 2)), (0, (2, 1)), "-.")
+
+
+def importers() -> Contents:
+    """Return what importers make of a Wavefront exponent, beside the best fit."""
+    curves = _curves()
+    answers, rules = _answers(), _rules()
+    low, high = float(_EXPONENTS[0]), float(_EXPONENTS[-1])
+    light = metric_named(_LIGHT)
+    formula = cheapest(SearchProblem(*endpoints(SHININESS, ROUGHNESS), light, low, high), 0.01)
+    at_100 = {
+        name: float(roughness[np.argmin(np.abs(curves["Ns"] - 100))])
+        for name, roughness in curves.items()
+    }
+    ratios = np.array([at_100[rule] / at_100[_LIGHT] for rule in IMPORTERS])
+    figures = {
+        "rules": len(IMPORTERS),
+        "lowest": min(rule["roughness_100"] for rule in rules),
+        "highest": max(rule["roughness_100"] for rule in rules),
+        "right": at_100[_LIGHT],
+    }
+    page = fill(
+        "importers",
+        constant=formula.numerator[0],
+        slope=formula.numerator[1],
+        root=-1 / formula.shape.outer,
+        formula_error=formula.error,
+        low=low,
+        high=high,
+        about_right=int((np.abs(ratios - 1) < _ABOUT_RIGHT).sum()),
+        tolerance=_ABOUT_RIGHT,
+        mirrors=sum(bool((curves[rule] < _MIRROR).any()) for rule in IMPORTERS),
+        rule_table=markdown_text(list(rules[0]), rules),
+        answers=markdown_text(list(answers[0]), answers),
+        **figures,
+    )
+    return Contents([page, csv_text(list(curves), rounded_rows(curves)), _draw(curves)], figures)
+
+
+def _curves() -> dict[str, Array]:
+    """Return Ns, the roughness by each rule and by ours, and the RMSE of each for the light."""
+    roughness = {rule: importer_roughness(rule, _EXPONENTS) for rule in IMPORTERS}
+    roughness |= {name: roughness_of(_EXPONENTS, metric_named(name)) for name in _OURS}
+    light = metric_named(_LIGHT)
+    errors = {
+        f"RMSE {name}": error_of(_EXPONENTS, roughness[name], light)
+        for name in (*IMPORTERS, _LIGHT)
+    }
+    return {"Ns": _EXPONENTS} | roughness | errors
+
+
+def _answers() -> list[dict[str, str]]:
+    """Return the right roughness of some exponents under each metric."""
+    shown = np.array([1.0, *EXPONENTS, 10000])
+    columns = {name: roughness_of(shown, metric_named(name)) for name in _OURS}
+    return [
+        {"Ns": f"{n:g}"} | {name: f"{columns[name][row]:.4g}" for name in _OURS}
+        for row, n in enumerate(shown)
+    ]
+
+
+def _rules() -> list[dict[str, Any]]:
+    """Return each rule with the roughness and the error that it leaves."""
+    rules = []
+    for record in encoding_records(metric_named(_LIGHT)):
+        name = record["encoding"].partition(":")[2]
+        if name in IMPORTERS:
+            row = {"importer": name, "programs": record["programs"], "rule": record["formula"]}
+            for n in EXPONENTS:
+                row[f"roughness_{n}"] = float(f"{record[f'roughness_{n}']:.3g}")
+            for n in EXPONENTS:
+                rmse = record[f"rmse_{n}"]
+                row[f"rmse_{n}"] = f"{rmse:.2g}" if np.isfinite(rmse) else "mirror"
+            rules.append(row)
+    return rules
+
+
+def _labels(curves: dict[str, Array]) -> dict[str, str]:
+    """Return the first of each group of importers that have one curve, and all their names."""
+    groups: dict[str, list[str]] = {}
+    for name in IMPORTERS:
+        same = (first for first in groups if np.allclose(curves[first], curves[name]))
+        groups.setdefault(next(same, name), []).append(name)
+    return {first: ", ".join(names) for first, names in groups.items()}
+
+
+def _draw(curves: dict[str, Array]) -> bytes:
+    figure = new_figure(PAGE[0] * 1.35, PAGE[1] * 1.05)
+    left, right = figure.subplots(1, 2)
+    colors = colormaps["tab10"](range(10)).tolist()
+    labels = _labels(curves)
+    styles = {
+        name: (colors[number % len(colors)], _DASHES[number % len(_DASHES)])
+        for number, name in enumerate(labels)
+    }
+    for name, (color, dashes) in (styles | _OUR_STYLES).items():
+        label = labels.get(name, f"mdfconv, {name}")
+        width = 2.0 if name == _LIGHT else 1.1
+        style = {"color": color, "linestyle": dashes, "linewidth": width}
+        left.plot(curves["Ns"], curves[name], label=label, **style)
+        if f"RMSE {name}" in curves:
+            errors = curves[f"RMSE {name}"]
+            finite = np.isfinite(errors)
+            right.plot(curves["Ns"][finite], errors[finite], **style)
+    left.set(xscale="log", xlabel="Ns", ylabel="roughness", title="What becomes of an exponent")
+    right.set(
+        xscale="log",
+        yscale="log",
+        xlabel="Ns",
+        ylabel="relative RMSE under environment",
+        title="Error, up to where a rule makes a mirror",
+    )
+    figure.legend(loc="outside lower center", ncols=5)
+    return encoded(figure, dpi=110)

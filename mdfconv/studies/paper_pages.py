@@ -1,0 +1,155 @@
+"""The pages on Sawicki 2021: its table, its formulas and its figures, recomputed."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from mdfconv.conversion import convert
+from mdfconv.distributions.endpoint import endpoints
+from mdfconv.fitting.metrics import list_metrics, metric_named
+from mdfconv.output.records import csv_text, markdown_text
+from mdfconv.render.comparison import (
+    PAPER_FIGURES,
+    PAPER_SETS,
+    REFERENCE,
+    Scene,
+    compare,
+    default_rules,
+)
+from mdfconv.render.comparison_figure import draw_comparison
+from mdfconv.render.page import filled, page_data
+from mdfconv.scene.shininess import ROUGHNESS
+from mdfconv.studies.closed_forms import refit_rows
+from mdfconv.studies.error_curves import Curves, curves, draw_errors
+from mdfconv.studies.pages import Contents, fill
+from mdfconv.studies.table2 import AGREEMENT, COLUMNS, fit_table, paper_sweep, printed_cells
+
+_UNIT = "unit"
+_POINTS = 1001
+# The paper states the largest error of Blinn/Phong for these exponents.
+_STATED = (10, 40, 100, 1000)
+# Small enough to be committed, large enough to see the difference.
+_FIGURE_DPI, _PICTURE_SIZE = 110, 192
+
+
+def table2() -> Contents:
+    """Return Table 2 and the printed cells that do not come back."""
+    rows = fit_table(*paper_sweep(), metric_named(_UNIT))
+    cells = [asdict(cell) for cell in printed_cells(rows)]
+    missed = [cell for cell in cells if not cell["agrees"]]
+    columns = [name for name in cells[0] if name != "agrees"]
+    figures = {
+        "agreeing": len(cells) - len(missed),
+        "cells": len(cells),
+        "missed": len(missed),
+        "tolerance": AGREEMENT,
+    }
+    page = fill(
+        "table2",
+        table=markdown_text(COLUMNS, rows),
+        missed_table=markdown_text(columns, missed),
+        **figures,
+    )
+    return Contents([page, csv_text(COLUMNS, rows)], figures)
+
+
+def table2_by_metric() -> Contents:
+    """Return the table for the metrics that the paper does not have."""
+    files, links = [], []
+    for name in list_metrics()[1:]:
+        metric = metric_named(name)
+        rows = fit_table(*paper_sweep(), metric)
+        page = fill(
+            "table2-metric",
+            metric=name,
+            keeps=metric.keeps,
+            smoothest=rows[-1]["m_b"],
+            ratio=rows[-1]["c_tr"] / rows[-1]["m_b"],
+            table=markdown_text(COLUMNS, rows),
+        )
+        files += [page, csv_text(COLUMNS, rows)]
+        links.append(f"[table2-{name}.md](table2-{name}.md)")
+    return Contents(files, {"links": ", ".join(links)})
+
+
+def closed_forms() -> Contents:
+    """Return the paper's coefficients beside refitted ones."""
+    rows = refit_rows([metric_named(name) for name in list_metrics()])
+    printed: dict[str, dict[str, Any]] = {}
+    refitted: dict[str, dict[str, Any]] = {}
+    worst: dict[str, dict[str, float]] = {"worst_printed": {}, "worst_refitted": {}}
+    for row in rows:
+        formula, metric = {"formula": row["formula"]}, row["metric"]
+        line = printed.setdefault(row["formula"], formula | {"a, b": row["printed"]})
+        line[metric] = f"{row['worst_printed']:.2%}"
+        line = refitted.setdefault(row["formula"], dict(formula))
+        line[metric] = f"{row['refitted']} ({row['worst_refitted']:.2%})"
+        for name, largest in worst.items():
+            largest[metric] = max(row[name], largest.get(metric, 0))
+    page = fill(
+        "closed-forms", printed_table=_table(printed), refitted_table=_table(refitted), **worst
+    )
+    shown = [row | {name: f"{row[name]:.4g}" for name in worst} for row in rows]
+    return Contents([page, csv_text(list(shown[0]), shown)], worst)
+
+
+def _table(rows: dict[str, dict[str, Any]]) -> str:
+    lines = list(rows.values())
+    return markdown_text(list(lines[0]), lines)
+
+
+def errors() -> Contents:
+    """Return Figures 1 and 2, and their maxima beside the paper's prose."""
+    drawn = {name: _curves(parameters) for name, parameters in PAPER_SETS.items()}
+    maxima = [{"figure": name} | row for name, each in drawn.items() for row in each.maxima()]
+    stated = {
+        n: {REFERENCE: convert(n, "blinn-phong", REFERENCE), "blinn-phong": n} for n in _STATED
+    }
+    figures: dict[str, Any] = {name: _largest(each) for name, each in drawn.items()}
+    figures["blinn_phong"] = {
+        n: _largest(_curves(pair))["blinn-phong"] for n, pair in stated.items()
+    }
+    page = fill("errors", maxima=markdown_text(list(maxima[0]), maxima), **figures)
+    files: list[str | bytes] = [page]
+    for name, each in drawn.items():
+        files += [draw_errors(each, f"Sawicki 2021, {name}", dpi=_FIGURE_DPI), each.error_text()]
+    return Contents(files, figures)
+
+
+def _curves(parameters: Any) -> Curves:
+    return curves(parameters, REFERENCE, metric_named(_UNIT), _POINTS)
+
+
+def _largest(drawn: Curves) -> dict[str, float]:
+    """Return the largest error of each distribution, a share of the reference's peak."""
+    return {row["distribution"]: row["max_error_percent"] / 100 for row in drawn.maxima()}
+
+
+def pictures() -> Contents:
+    """Return Figures 4 and 5: pictures, sections through the highlight, and their errors."""
+    files: list[str | bytes] = []
+    rows: list[dict[str, Any]] = []
+    scene = Scene(size=_PICTURE_SIZE)
+    rules = default_rules(scene.exposure)
+    for name, m_b in PAPER_FIGURES.items():
+        comparison = compare(m_b, rules, scene)
+        files += [draw_comparison(comparison, _FIGURE_DPI), csv_text(*comparison.section_rows())]
+        rows += [{"figure": name} | row for row in comparison.table()]
+    figures = {
+        name: {
+            row["distribution"]: row
+            for row in rows
+            if (row["figure"], row["conversion"]) == (name, rules[0].label)
+        }
+        for name in PAPER_FIGURES
+    }
+    columns = [name for name in rows[0] if not name.startswith("psnr")]
+    page = fill("pictures", table=markdown_text(columns, rows), **figures)
+    return Contents([page, *files], figures)
+
+
+def comparison() -> Contents:
+    """Return the page for a browser: the reference and what most renderers have, with sliders."""
+    data = page_data(*endpoints(REFERENCE, ROUGHNESS))
+    return Contents([filled(data)], {"interpolation": data["interpolation"]})

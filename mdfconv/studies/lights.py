@@ -44,7 +44,7 @@ from mdfconv.distributions import Distribution, one_parameter_distributions
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.fitting.solve import fit
-from mdfconv.studies.bench.methods import as_wide
+from mdfconv.studies.bench import as_wide
 
 LINEAR, FLIP = "linear RMSE", "HDR-FLIP"
 _COLUMNS = {LINEAR: "linear_rmse", "sRGB RMSE": "srgb_rmse", FLIP: "hdr_flip"}

@@ -16,7 +16,8 @@ from mdfconv.distributions.equivalence import exact_route
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.output.records import csv_text, markdown_text
-from mdfconv.studies.bench.methods import answers, as_wide
+from mdfconv.recommend import answers
+from mdfconv.studies.bench import as_wide
 from mdfconv.studies.pages import Contents, fill
 
 # Beckmann's m_B for lobes of the same half width.

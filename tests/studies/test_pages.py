@@ -65,7 +65,7 @@ def quoted():
 
 def _gives_numbers(command, *arguments):
     """Return whether a line is one to run; the bare name of a command with arguments is none."""
-    needed = any(one.required for one in GROUP.commands[command].params)
+    needed = any(one.required for one in GROUP.get_command(None, command).params)
     return command not in TOO_LONG and (bool(arguments) or not needed)
 
 

@@ -23,7 +23,6 @@ from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
     from mdfconv.distributions.evaluation import Array
-    from mdfconv.fitting.metrics import Metric
 
 _LARGEST_SWEEP = 10_000
 
@@ -82,50 +81,34 @@ def command(
             "--sweep, --m-b or --extended"
         )
     kept = chosen_metric(metric, exposure)
-    outputs = Outputs(table=output, force=force, inputs=kept.inputs)
     if closed_forms:
         refuse_given(context, ["metric"], "does not go with --closed-forms, which has every metric")
-        columns, rows, title = _closed_forms(exposure)
-        minor = ["formula", "worst_printed", "printed"]
-        write_table(columns, rows, format_, outputs, title=title, secondary=minor)
-        return
     if compare and kept.name != "unit":
         raise MdfconvError("--compare: the paper's table has the unit metric only")
-    if compare:
-        columns, rows, title = _comparison()
+    outputs = Outputs(table=output, force=force, inputs=kept.inputs)
+    rows: list[dict[str, Any]]
+    if closed_forms:
+        from mdfconv.studies.closed_forms import refit_rows
+
+        rows = refit_rows(every_metric(exposure))
+        title = "Closed forms: coefficients and worst relative error"
+        minor = ["formula", "worst_printed", "printed"]
+    elif compare:
+        from mdfconv.studies.table2 import printed_cells
+
+        rows = [vars(cell) for cell in printed_cells()]
+        agreeing = sum(row["agrees"] for row in rows)
+        title = f"Table 2 of Sawicki 2021: {agreeing} of {len(rows)} cells within 4e-4"
+        minor = ["units"]
     else:
-        columns, rows, title = _table(kept, sweep, m_b, extended)
-    minor = ["units", *(name for name in columns if name.startswith("rmse"))]
-    write_table(columns, rows, format_, outputs, title=title, secondary=minor)
+        from mdfconv.studies.table2 import fit_table
 
-
-def _comparison() -> tuple[list[str], list[dict[str, Any]], str]:
-    from dataclasses import asdict
-
-    from mdfconv.studies.table2 import printed_cells
-
-    rows = [asdict(cell) for cell in printed_cells()]
-    agreeing = sum(row["agrees"] for row in rows)
-    title = f"Table 2 of Sawicki 2021: {agreeing} of {len(rows)} cells within 4e-4"
-    return list(rows[0]), rows, title
-
-
-def _closed_forms(exposure: float | None) -> tuple[list[str], list[dict[str, Any]], str]:
-    from mdfconv.studies.closed_forms import refit_rows
-
-    rows = refit_rows(every_metric(exposure))
-    return list(rows[0]), rows, "Closed forms: coefficients and worst relative error"
-
-
-def _table(
-    metric: Metric, sweep: str | None, m_b: list[float] | None, extended: bool
-) -> tuple[list[str], list[dict[str, float]], str]:
-    from mdfconv.studies.table2 import fit_table
-
-    values, limit = _sweep(sweep, m_b)
-    with progress("Fitting", values.size) as advance:
-        rows = fit_table(values, limit, metric, extended=extended, progress=advance)
-    return list(rows[0]), rows, f"Fits of Beckmann, metric {metric}"
+        values, limit = _sweep(sweep, m_b)
+        with progress("Fitting", values.size) as advance:
+            rows = fit_table(values, limit, kept, extended=extended, progress=advance)
+        title = f"Fits of Beckmann, metric {kept}"
+        minor = [name for name in rows[0] if name.startswith("rmse")]
+    write_table(list(rows[0]), rows, format_, outputs, title=title, secondary=minor)
 
 
 def _sweep(sweep: str | None, m_b: list[float] | None) -> tuple[Array, Array]:
@@ -137,15 +120,15 @@ def _sweep(sweep: str | None, m_b: list[float] | None) -> tuple[Array, Array]:
 
     if sweep and m_b:
         raise MdfconvError("give either --sweep or --m-b")
-    if not sweep and not m_b:
-        return paper_sweep()
-    beckmann = distribution("beckmann")
-    if m_b:
-        values = np.array(beckmann.parameter.check(m_b, "beckmann"))
-    else:
-        low, high, count = _sweep_ends(sweep or "")
-        ends = beckmann.parameter.check([low, high], "beckmann")
+    check = distribution("beckmann").parameter.check
+    if sweep:
+        low, high, count = _sweep_ends(sweep)
+        ends = check([low, high], "beckmann")
         values = np.geomspace(float(ends[0]), float(ends[1]), count)
+    elif m_b:
+        values = np.array(check(m_b, "beckmann"))
+    else:
+        return paper_sweep()
     return values, angle_limit(values)
 
 

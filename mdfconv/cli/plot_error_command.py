@@ -27,9 +27,7 @@ from mdfconv.errors import MdfconvError
 from mdfconv.output.files import file_bytes
 
 if TYPE_CHECKING:
-    from mdfconv.distributions.endpoint import Endpoint
     from mdfconv.fitting.metrics import Metric
-    from mdfconv.studies.error_curves import Curves
 
 _REFERENCE = "beckmann"
 _COLUMNS = ("figure", "distribution", "parameter", "max_error_percent", "beta_rad")
@@ -85,73 +83,61 @@ def command(
     mdfconv plot-error --m-b 0.2 --reference ggx --mdf beckmann --no-csv --output /tmp
     """
     from mdfconv.conversion.arrays import given_metric
-    from mdfconv.studies.error_curves import curves
+    from mdfconv.studies.error_curves import curves, draw_errors
 
     if not png and not svg:
         refuse_given(context, ["dpi", "log"], "is of pictures: give no --no-png, or --svg")
     asked = asked_metric(metric, exposure)
     chief = one_parameter_distribution(reference).name
-    ends = [asked_endpoint(name) for name in mdf or ()]
-    sets = _sets(m_b, method, asked, chief, ends)
-    endings = [*[".png"] * png, *[".svg"] * svg, *["b.csv"] * csv]
+    chosen = [asked_endpoint(name) for name in mdf or ()]
+    names = [one.distribution.name for one in chosen]
+    sets = _parameter_sets(m_b, method, asked, chief, names)
+    forms = [*["png"] * png, *["svg"] * svg]
     folder = check_folder(context, output)
+    endings = [*(f".{form}" for form in forms), *["b.csv"] * csv]
     outputs = Outputs(*(folder / f"{name}{end}" for name in sets for end in endings), force=force)
-    shown = given_metric(asked)
-    figures = {name: curves(each, chief, shown, points) for name, each in sets.items()}
-    contents = {
-        folder / f"{name}{end}": _file(name, drawn, end, dpi=dpi, log=log)
-        for name, drawn in figures.items()
-        for end in endings
-    }
-    rows = [
-        {"figure": name} | row
-        for name, drawn in figures.items()
-        for row in in_asked_forms(drawn.maxima(), ends)
-    ]
+    contents, rows = {}, []
+    for name, parameters in sets.items():
+        drawn = curves(parameters, given_metric(asked), points)
+        title = f"{chief} and its substitutes ({name})"
+        for form in forms:
+            picture = draw_errors(drawn, title, form=form, dpi=dpi, log=log)
+            contents[folder / f"{name}.{form}"] = picture
+        if csv:
+            contents[folder / f"{name}b.csv"] = file_bytes(drawn.error_text())
+        rows += [{"figure": name} | row for row in in_asked_forms(drawn.maxima(), chosen)]
     title = f"Largest error against {chief}"
     write_table(_COLUMNS, rows, format_, outputs, beside=contents, title=title)
 
 
-def _sets(
+def _parameter_sets(
     m_b: list[float] | None,
     method: str | None,
     metric: Metric | None,
     chief: str,
-    ends: Sequence[Endpoint],
+    names: Sequence[str],
 ) -> dict[str, dict[str, float]]:
-    """Return the parameters of each figure by its name."""
+    """Return the parameters of each figure by its name, the reference's first."""
     from mdfconv.render.comparison import DRAWN, PAPER_SETS
     from mdfconv.studies.error_curves import parameters_for
 
-    names = list(dict.fromkeys(end.distribution.name for end in ends))
     if m_b:
-        names = names or [name for name in (_REFERENCE, *DRAWN) if name != chief]
-        wanted = dict.fromkeys([chief, *names])
+        shown = dict.fromkeys([chief, *(names or (_REFERENCE, *DRAWN))])
         sets = {
-            f"error-m_b-{value_name(value)}": parameters_for(value, list(wanted), method, metric)
+            f"error-m_b-{value_name(value)}": parameters_for(value, list(shown), method, metric)
             for value in m_b
         }
+    elif method:
+        raise MdfconvError("--method converts an --m-b: give one")
     else:
-        if method:
-            raise MdfconvError("--method converts an --m-b: give one")
-        names = names or list(PAPER_SETS["fig1"])
-        unknown = [name for name in [chief, *names] if name not in PAPER_SETS["fig1"]]
-        if unknown:
-            raise MdfconvError(f"the paper's figures have no {unknown[0]}: give --m-b")
+        shown = dict.fromkeys([chief, *(names or PAPER_SETS["fig1"])])
+        for name in shown:
+            if name not in PAPER_SETS["fig1"]:
+                raise MdfconvError(f"the paper's figures have no {name}: give --m-b")
         sets = {
-            figure: {name: printed[name] for name in dict.fromkeys([chief, *names])}
+            figure: {name: printed[name] for name in shown}
             for figure, printed in PAPER_SETS.items()
         }
-    if any(set(parameters) == {chief} for parameters in sets.values()):
+    if len(shown) == 1:
         raise MdfconvError(f"{chief} is the reference: name another --mdf to compare with it")
     return sets
-
-
-def _file(name: str, drawn: Curves, end: str, *, dpi: int, log: bool) -> bytes:
-    """Return the content of a figure's file by what its name ends in."""
-    if end == "b.csv":
-        return file_bytes(drawn.error_text())
-    from mdfconv.studies.error_curves import draw_errors
-
-    title = f"{drawn.reference} and its substitutes ({name})"
-    return draw_errors(drawn, title, form=end.removeprefix("."), dpi=dpi, log=log)

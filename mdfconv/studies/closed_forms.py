@@ -11,48 +11,29 @@ from scipy.optimize import least_squares
 
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
-from mdfconv.studies.table2 import fit_table, paper_sweep
-
-Shape = Callable[..., Array]
+from mdfconv.studies.table2 import FITTED, fit_table, paper_sweep
 
 
 @dataclass(frozen=True)
 class Law:
-    """The shape of a printed formula, with its coefficients.
+    """A printed formula from one distribution to another, in text with letters for coefficients.
 
-    Parameters
-    ----------
-    source, target : str
-        The distributions.
-    text : str
-        The formula with letters for its coefficients.
-    shape : callable
-        ``shape(x, *coefficients)``.
-    printed : tuple of float
-        The paper's coefficients.
+    `shape` takes the source's parameters and then the coefficients.
     """
 
     source: str
     target: str
     text: str
-    shape: Shape
+    shape: Callable[..., Array]
     printed: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Refit:
-    """A formula refitted to the table of a metric.
+    """A formula refitted to the table of a metric, least squares of the relative error.
 
-    Parameters
-    ----------
-    form : Form
-        The formula.
-    metric : str
-        The metric of the table.
-    coefficients : tuple of float
-        Least squares of the relative error over the 17 rows.
-    printed_error, error : float
-        The worst relative error over the rows, with the printed coefficients and with these.
+    The errors are the worst relative ones over the rows, with the printed coefficients and with
+    these.
     """
 
     form: Law
@@ -96,22 +77,13 @@ FORMS: Sequence[Law] = (
 )  # fmt: skip
 
 _DECIMALS = 9
-_COLUMNS = {
-    "beckmann": "m_b",
-    "blinn-phong": "n",
-    "gauss": "m_g",
-    "sawicki": "n_ds",
-    "ggx": "c_tr",
-}
+_COLUMNS = {"beckmann": "m_b"} | {name: column for column, name in FITTED.items()}
 
 
 def refit(metric: Metric) -> list[Refit]:
     """Refit every printed formula to the table of a metric over the paper's sweep.
 
-    Parameters
-    ----------
-    metric : Metric
-        Unit gives the table that the paper's own coefficients were fitted to.
+    The unit metric gives the table that the paper's own coefficients were fitted to.
     """
     rows = fit_table(*paper_sweep(), metric)
     table = {name: np.array([row[key] for row in rows]) for name, key in _COLUMNS.items()}

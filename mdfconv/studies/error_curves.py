@@ -22,20 +22,10 @@ _MOST_POINTS = 1_000_000
 
 @dataclass(frozen=True)
 class Curves:
-    """Distributions against β, and their error.
+    """Distributions against β, the reference first, and their error.
 
-    Parameters
-    ----------
-    parameters : dict
-        From names to parameters, the reference first.
-    beta : numpy.ndarray, shape (n,)
-        Angles, radians.
-    values : dict
-        From names to the metric's signal: D̄ for the unit metric.
-    quantity : str
-        What the values are, for an axis.
-    errors : dict
-        From names but the reference's to (signal − reference)/max reference.
+    `values` are the metric's signal, D̄ for the unit metric; `errors`, of all but the reference,
+    are (signal − reference)/max reference.
     """
 
     parameters: Mapping[str, float]
@@ -56,18 +46,16 @@ class Curves:
 
     def maxima(self) -> list[dict[str, Any]]:
         """Return for each distribution the largest |error| and where it occurs."""
-        rows = []
-        for name, error in self.errors.items():
-            index = int(np.argmax(np.abs(error)))
-            rows.append(
-                {
-                    "distribution": name,
-                    "parameter": float(self.parameters[name]),
-                    "max_error_percent": 100 * float(abs(error[index])),
-                    "beta_rad": float(self.beta[index]),
-                }
-            )
-        return rows
+        largest = {name: int(np.argmax(np.abs(error))) for name, error in self.errors.items()}
+        return [
+            {
+                "distribution": name,
+                "parameter": float(self.parameters[name]),
+                "max_error_percent": 100 * float(abs(self.errors[name][index])),
+                "beta_rad": float(self.beta[index]),
+            }
+            for name, index in largest.items()
+        ]
 
 
 def parameters_for(
@@ -77,19 +65,11 @@ def parameters_for(
     return {name: float(convert(m_b, "beckmann", name, method, metric=metric)) for name in names}
 
 
-def curves(parameters: Mapping[str, float], reference: str, metric: Metric, points: int) -> Curves:
-    """Evaluate distributions on a range of β that follows the reference's lobe.
+def curves(parameters: Mapping[str, float], metric: Metric, points: int) -> Curves:
+    """Evaluate distributions on a range of β that follows the lobe of the first, the reference.
 
-    Parameters
-    ----------
-    parameters : dict
-        From names to parameters; the reference is among them.
-    reference : str
-        The distribution to compare with.
-    metric : Metric
-        Unit compares unit forms, as the paper; others what they compare in a fit.
-    points : int
-        Number of angles, from 0 to 4.8 β_half of the reference, at most π/2.
+    The unit metric compares unit forms, as the paper; others what they compare in a fit. The
+    angles run from 0 to 4.8 β_half of the reference, at most π/2.
 
     Raises
     ------
@@ -100,21 +80,20 @@ def curves(parameters: Mapping[str, float], reference: str, metric: Metric, poin
         raise MdfconvError(f"the number of points is from 2 to {_MOST_POINTS}")
     if not metric.over_angles:
         raise MdfconvError(f"{metric} compares spectra: it has no curves over β")
-    source, parameter = distribution(reference), np.array([parameters[reference]])
-    beta = np.linspace(0, float(lobe_extent(source, parameter)[0]), points)
-    peak = source.maximum(parameter, normalized=metric.normalized)
+    arrays = {name: np.array([float(value)]) for name, value in parameters.items()}
+    reference = next(iter(parameters))
+    source = distribution(reference)
+    beta = np.linspace(0, float(lobe_extent(source, arrays[reference])[0]), points)
+    peak = source.maximum(arrays[reference], normalized=metric.normalized)
     values = {
-        name: metric.signal(distribution(name), beta, np.array([float(parameters[name])]), peak)
-        for name in dict.fromkeys([reference, *parameters])
+        name: metric.signal(distribution(name), beta, value, peak) for name, value in arrays.items()
     }
-    top = values[reference].max()
     errors = {
-        name: (value - values[reference]) / top
+        name: (value - values[reference]) / values[reference].max()
         for name, value in values.items()
         if name != reference
     }
-    shown = {name: parameters[name] for name in values}
-    return Curves(shown, beta, values, metric.quantity, errors)
+    return Curves(parameters, beta, values, metric.quantity, errors)
 
 
 _SIZE = (7.2, 7.0)  # inches
@@ -124,21 +103,7 @@ _FLOOR = 1e-6  # of the logarithmic axis
 def draw_errors(
     drawn: Curves, title: str, *, form: str = "png", dpi: int = 150, log: bool = False
 ) -> bytes:
-    """Return a picture of curves (a) and of their error (b).
-
-    Parameters
-    ----------
-    drawn : Curves
-        The curves.
-    title : str
-        What is shown.
-    form : str
-        ``"png"`` or ``"svg"``.
-    dpi : int
-        Resolution of a PNG.
-    log : bool
-        Whether (a) is logarithmic, for the tails.
-    """
+    """Return a picture of curves (a), logarithmic to show the tails, and of their error (b)."""
     figure = new_figure(*_SIZE)
     upper, lower = figure.subplots(2, 1, sharex=True)
     for name, value in drawn.values.items():

@@ -118,7 +118,7 @@ def errors() -> Contents:
 
 
 def _curves(parameters: Any) -> Curves:
-    return curves(parameters, REFERENCE, metric_named(_UNIT), _POINTS)
+    return curves(parameters, metric_named(_UNIT), _POINTS)
 
 
 def _largest(drawn: Curves) -> dict[str, float]:

@@ -39,46 +39,14 @@ COLUMNS = (
     "c_tr", "rmse_c_tr",
 )  # fmt: skip
 
-_EQ11 = "the protocol that returns every other row gives this"
-REASONS = {
-    ("0.4473", "m_g"): "the fit is 0.4966 on β up to 1.2 and up to 1.4 alike: printed 0.4970 "
-    "fits neither",
-    (
-        "0.4473",
-        "rmse_m_g",
-    ): "taken on β up to 1.2, which gives 0.03396; the row's other cells are on 1.4",
-    ("0.1415", "rmse_m_g"): "a slip of the decimal point for 0.001910",
-    ("0.01415", "n_ds"): "printed 11749, the fit is 11739",
-    ("0.01415", "rmse_n"): "printed 1.321e-5, the fit is 1.316e-5",
-    ("0.005164", "rmse_n"): "printed 1.793e-6, the fit is 1.792e-6",
-    ("0.1634", "rmse_n_eq11"): _EQ11,
-    ("0.05164", "rmse_n_eq11"): _EQ11,
-    ("0.01634", "rmse_n_eq11"): _EQ11,
-    ("0.005164", "rmse_n_eq11"): _EQ11,
-}
-
 Row = dict[str, float]
-Progress = Callable[[int], None]
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One printed cell beside ours.
+    """A printed cell beside ours.
 
-    Parameters
-    ----------
-    m_b, column : str
-        The row, as printed, and the column.
-    printed : str
-        The printed number.
-    ours : float
-        The number that the protocol gives.
-    units : float
-        The difference in units of the last printed digit.
-    agrees : bool
-        Whether it is within 4e-4 relative.
-    reason : str
-        Why it does not come back, if it does not.
+    `units` is the difference in units of the last printed digit; a reason has what does not agree.
     """
 
     m_b: str
@@ -88,11 +56,6 @@ class Cell:
     units: float
     agrees: bool
     reason: str
-
-
-def printed_rows() -> list[dict[str, str]]:
-    """Return the rows of the paper's Table 2, as printed."""
-    return _read("table2.csv")
 
 
 def paper_sweep() -> tuple[Array, Array]:
@@ -113,30 +76,15 @@ def fit_table(
     metric: Metric,
     *,
     extended: bool = False,
-    progress: Progress = lambda rows: None,
+    progress: Callable[[int], None] = lambda rows: None,
 ) -> list[Row]:
-    """Fit every column of the table for a sweep of m_B.
+    """Fit every column of the table for a sweep of m_B, and return its rows.
 
-    Parameters
-    ----------
-    m_b : numpy.ndarray, shape (n,)
-        Beckmann's parameters.
-    limit : numpy.ndarray, shape (n,)
-        The limit of β of each row, radians, for the unit metric.
-    metric : Metric
-        Unit: the paper's protocol, on 3001 uniform angles, and its RMSE. Others: the fit over
-        the hemisphere, with the relative root mean square of `remaining_error`.
-    extended : bool
-        Whether to add the distributions that the paper's table lacks, with γ of those that
-        have one.
-    progress : callable
-        Told the number of rows done after every batch.
-
-    Returns
-    -------
-    list of dict
-        A row for each m_B: `COLUMNS`, and of each further distribution its parameter under its
-        name, ``gamma_`` and ``rmse_`` before it.
+    Under the unit metric by the paper's protocol, on β up to a limit for each m_B. Under others
+    over the hemisphere, with the relative root mean square of `remaining_error`. An extended table
+    has the distributions that the paper's lacks, too: a parameter under the name of the
+    distribution, ``gamma_`` and ``rmse_`` before it. `progress` is called with the number of rows
+    done after each batch.
     """
     rows: list[Row] = []
     for start in range(0, m_b.size, _BATCH):
@@ -153,10 +101,15 @@ def fit_table(
 
 def printed_cells(ours: list[Row] | None = None) -> Iterator[Cell]:
     """Yield the 153 printed parameters and errors beside ours, fitted anew if not given."""
+    reasons = {(row["m_b"], row["column"]): row["reason"] for row in _read("table2_missed.csv")}
     ours = fit_table(*paper_sweep(), Unit()) if ours is None else ours
-    for printed, row in zip(printed_rows(), ours, strict=True):
+    for printed, row in zip(_read("table2.csv"), ours, strict=True):
         for column in COLUMNS[2:]:
-            yield _cell(printed["m_b"], column, printed[column], row[column])
+            value, cell = float(printed[column]), (printed["m_b"], column)
+            agrees = abs(row[column] / value - 1) <= AGREEMENT
+            units = (row[column] - value) / _last_digit(column, printed[column])
+            reason = "" if agrees else reasons.get(cell, "unexplained")
+            yield Cell(*cell, printed[column], row[column], units, agrees, reason)
 
 
 def _read(name: str) -> list[dict[str, str]]:
@@ -180,9 +133,12 @@ def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dic
         distance, _ = FitProblem(*by_eq11, metric, samples, rows).distance(np.log(n_eq11), rows)
         rmse_eq11 = np.sqrt(distance / SAMPLES)
     columns = {"m_b": m_b, "n_eq11": n_eq11, "rmse_n_eq11": rmse_eq11}
-    targets = FITTED | (further_targets() if extended else {})
-    for column, name in targets.items():
-        target = distribution(name)
+    targets = {column: distribution(name) for column, name in FITTED.items()}
+    if extended:
+        known = (source, *targets.values())
+        others = [mdf for mdf in one_parameter_distributions() if mdf not in known]
+        targets |= {mdf.name.replace("-", "_"): mdf for mdf in others}
+    for column, target in targets.items():
         gamma = None
         if target.second_parameter:
             free = fit_free_gamma(source, m_b, target, metric, samples)
@@ -192,7 +148,7 @@ def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dic
             fixed = fit(source, m_b, target, metric, samples)
             best, distance = fixed.parameter, fixed.distance
             columns[column] = best
-        _check_answers(m_b, best, name)
+        _check_answers(m_b, best, target.name)
         if samples is None:
             rmse, _ = remaining_error(source, m_b, target, best, metric, gamma)
         else:
@@ -202,31 +158,10 @@ def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dic
     return columns
 
 
-def further_targets() -> dict[str, str]:
-    """Return the distributions that the paper's table lacks, by the names of their columns."""
-    known = (_SOURCE, *FITTED.values())
-    names = [mdf.name for mdf in one_parameter_distributions() if mdf.name not in known]
-    return {name.replace("-", "_"): name for name in names}
-
-
 def _check_answers(m_b: Array, parameter: Array, name: str) -> None:
     if np.isnan(parameter).any():
         bad = float(m_b[int(np.argmax(np.isnan(parameter)))])
         raise MdfconvError(f"{_SOURCE} m_B = {bad:g} has no best fit in {name}")
-
-
-def _cell(m_b: str, column: str, printed: str, ours: float) -> Cell:
-    value = float(printed)
-    agrees = abs(ours / value - 1) <= AGREEMENT
-    return Cell(
-        m_b=m_b,
-        column=column,
-        printed=printed,
-        ours=ours,
-        units=(ours - value) / _last_digit(column, printed),
-        agrees=agrees,
-        reason="" if agrees else REASONS.get((m_b, column), "unexplained"),
-    )
 
 
 def _last_digit(column: str, printed: str) -> float:

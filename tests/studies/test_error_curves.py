@@ -21,7 +21,7 @@ MAXIMA = {
 
 @pytest.mark.parametrize("figure", MAXIMA)
 def test_maxima_of_the_papers_figures(figure):
-    found = curves(PAPER_SETS[figure], "beckmann", metric_named("unit"), 1001)
+    found = curves(PAPER_SETS[figure], metric_named("unit"), 1001)
     for row in found.maxima():
         printed = MAXIMA[figure][row["distribution"]]
         digits = 3 if printed > 0.1 else 2
@@ -29,9 +29,9 @@ def test_maxima_of_the_papers_figures(figure):
 
 
 def test_curves_follow_the_lobe():
-    smooth = curves({"beckmann": 1e-4, "ggx": 1.2e-4}, "beckmann", metric_named("energy"), 101)
+    smooth = curves({"beckmann": 1e-4, "ggx": 1.2e-4}, metric_named("energy"), 101)
     assert 3e-4 < smooth.beta[-1] < 5e-4
-    rough = curves({"ggx": 1.0, "beckmann": 1.0}, "ggx", metric_named("unit"), 101)
+    rough = curves({"ggx": 1.0, "beckmann": 1.0}, metric_named("unit"), 101)
     assert rough.beta[-1] == np.pi / 2
     assert rough.values["ggx"].max() == 1
 

@@ -16,17 +16,12 @@ from mdfconv.studies.pages import Contents, fill
 
 COLUMNS = ("curve", "a", "b", "weighted_rms", "cosine", "max_error", "rms_error")
 _DRAWN_IORS = (1.33, 1.4, 1.5)  # water, the article's, glass
-_EXACT_STYLES: tuple[tuple[str, Any], ...] = (
-    ("#56B4E9", "-"),
-    ("#000000", "-"),
-    ("#0072B2", "-"),
-    ("#999999", "-"),
-)
-_STYLES: dict[str, tuple[str, Any]] = {
-    "fit": ("#D55E00", "-"),
-    "printed": ("#E69F00", (0, (4, 3))),
-    "(1-x)^5": ("#009E73", (0, (6, 2, 1, 2))),
-    "exp(-6x)": ("#CC79A7", (0, (1, 1.2))),
+_EXACT_COLORS = ("#56B4E9", "#000000", "#0072B2", "#999999")
+_STYLES: dict[str, dict[str, Any]] = {
+    "fit": {"color": "#D55E00", "linestyle": "-"},
+    "printed": {"color": "#E69F00", "linestyle": (0, (4, 3))},
+    "(1-x)^5": {"color": "#009E73", "linestyle": (0, (6, 2, 1, 2))},
+    "exp(-6x)": {"color": "#CC79A7", "linestyle": (0, (1, 1.2))},
 }
 _POINTS = 101
 
@@ -61,18 +56,14 @@ def fresnel() -> Contents:
     for row in rows:
         cells = ranges.setdefault(row["cosine"], {"l·H": row["cosine"]})
         cells[row["curve"]] = f"{row['max_error']:.3f} ({row['rms_error']:.3f})"
-    gaussian, _ = fitted.errors(fitted.curves()["exp(-6x)"], EDGES[0], EDGES[-1])
-    off = max(
-        abs(ours / printed - 1)
-        for ours, printed in zip((fitted.a, fitted.b), SMOOTHIE_FIT, strict=True)
-    )
-    figures = {"a": fitted.a, "b": fitted.b, "off": off}
+    off = np.abs(np.divide((fitted.a, fitted.b), SMOOTHIE_FIT) - 1).max()
+    figures = {"a": fitted.a, "b": fitted.b, "off": float(off)}
     page = fill(
         "fresnel",
         ior=fitted.ior,
         weighted=weighted,
         least=2**fitted.a,
-        gaussian=gaussian,
+        gaussian=rows[-1]["max_error"],
         constants=markdown_text(COLUMNS[:4], constants),
         ranges=markdown_text(["l·H", *_STYLES], list(ranges.values())),
         **figures,
@@ -91,21 +82,27 @@ def draw_fresnel(fitted: FresnelFit, dpi: int = 110) -> bytes:
     left, right = figure.subplots(1, 2)
     cosine = grid()
     iors = dict.fromkeys([*_DRAWN_IORS, fitted.ior])
-    for ior, drawn in zip(iors, _EXACT_STYLES, strict=False):
-        style = _line(drawn, 1.1)
-        left.plot(cosine, rescaled(cosine, ior), label=f"exact, IOR {ior:g}", **style)
+    for ior, color in zip(iors, _EXACT_COLORS, strict=False):
+        curve = rescaled(cosine, ior)
+        left.plot(cosine, curve, label=f"exact, IOR {ior:g}", color=color, linewidth=1.1)
     exact = rescaled(cosine, fitted.ior)
-    for name, curve in fitted.curves().items():
-        style = _line(_STYLES[name], 1.6)
-        left.plot(cosine, curve(cosine), label=_label(name, fitted), **style)
-        right.plot(cosine, curve(cosine) - exact, **style)
+    constants = {"fit": (fitted.a, fitted.b), "printed": SMOOTHIE_FIT}
+    for name, approximation in fitted.curves().items():
+        a_b = constants.get(name)
+        label = f"{name}, a = {a_b[0]:.4f}, b = {a_b[1]:.4f}" if a_b else name
+        left.plot(cosine, approximation(cosine), label=label, linewidth=1.6, **_STYLES[name])
+        right.plot(cosine, approximation(cosine) - exact, linewidth=1.6, **_STYLES[name])
     left.set(
         xlabel="l·H",
         ylabel="(F − F₀) / (1 − F₀)",
         title="Rescaled reflectance: grazing at 0, along the normal at 1",
         ylim=(-0.02, 1.02),
     )
-    _draw_weight(right, cosine, fitted)
+    # The weight stands on the bottom of the axes, behind the errors, on a scale of its own.
+    scale = right.twinx()
+    scale.fill_between(cosine, fitted.weight(cosine), color="0.9", linewidth=0)
+    scale.set(ylim=(0, 2.5), yticks=[], zorder=right.get_zorder() - 1)
+    right.patch.set_visible(False)
     right.set(
         xlabel="l·H",
         ylabel="approximation − exact",
@@ -114,24 +111,3 @@ def draw_fresnel(fitted: FresnelFit, dpi: int = 110) -> bytes:
     )
     figure.legend(loc="outside lower center", ncols=4)
     return encoded(figure, dpi=dpi)
-
-
-def _draw_weight(axes: Any, cosine: Array, fitted: FresnelFit) -> None:
-    """Shade the weight from the bottom of the axes, on a scale of its own."""
-    scale = axes.twinx()
-    scale.fill_between(cosine, fitted.weight(cosine), color="0.9", linewidth=0)
-    scale.set(ylim=(0, 2.5), yticks=[])
-    scale.set_zorder(axes.get_zorder() - 1)
-    axes.patch.set_visible(False)
-
-
-def _line(style: tuple[str, Any], width: float) -> dict[str, Any]:
-    return {"color": style[0], "linestyle": style[1], "linewidth": width}
-
-
-def _label(name: str, fitted: FresnelFit) -> str:
-    constants = {"fit": (fitted.a, fitted.b), "printed": SMOOTHIE_FIT}
-    if name not in constants:
-        return name
-    a, b = constants[name]
-    return f"{name}, a = {a:.4f}, b = {b:.4f}"

@@ -37,6 +37,7 @@ import csv
 from dataclasses import dataclass
 from importlib.resources import files
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 
@@ -152,6 +153,17 @@ class SmoothConstant:
     def law(self) -> str:
         """The right-hand side in the source's symbol, such as ``"2.00000 / m_B²"``."""
         return _TERMS[self.power].format(f"{self.constant:.5f}", self.source.parameter.symbol)
+
+    def record(self) -> dict[str, Any]:
+        """Return a row of a table."""
+        return {
+            "from": self.source.name,
+            "to": self.target.name,
+            "constant": float(f"{self.constant:.6g}"),
+            "power": self.power,
+            "exact": self.exact,
+            f"deviation at m_B {ROUGH:g}": float(f"{self.deviation:.4g}"),
+        }
 
 
 def smooth_constants() -> list[SmoothConstant]:

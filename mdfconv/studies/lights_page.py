@@ -50,17 +50,15 @@ _DIAGONAL = (0.58, 0.96)
 
 def lights() -> Contents:
     """Return the evidence for the metrics: theory, rendered spheres, constants."""
-    renders = read_renders()
+    from scipy.stats import spearmanr
+
+    renders, constants = read_renders(), smooth_constants()
     exponents = np.array([equivalent_exponent(ratio) for ratio in renders.predicted])
-    metrics = {
-        name: _fitted("ggx", np.array([SMOOTH]), name)[0] / SMOOTH for name in _METRIC_STYLES
-    }
-    constants = smooth_constants()
-    figures = {"cases": len(renders.m_b), "prediction": prediction_error(renders)}
+    smooth = np.array([SMOOTH])
+    metrics = {name: _fitted("ggx", smooth, name)[0] / SMOOTH for name in _METRIC_STYLES}
     off = renders.predicted / renders.best[LINEAR] - 1
-    environment, beckmann = metric_named("environment"), distribution("beckmann")
-    students = {gamma: distribution("student-t").with_gamma(gamma) for gamma in (3, 5, 20)}
     deviations = [abs(one.deviation) for one in constants if not one.exact]
+    figures = {"cases": len(off), "prediction": prediction_error(renders)}
     page = fill(
         "lights",
         environments=len(set(renders.environment)),
@@ -71,15 +69,15 @@ def lights() -> Contents:
         ends={name: int(np.sum(best == _LOWEST)) for name, best in renders.best.items()},
         signed={f"{m_b:g}": np.median(off[renders.m_b == m_b]) for m_b in np.unique(renders.m_b)},
         rank={
-            name: rank_correlation(renders.predicted, renders.best[name]) for name in (LINEAR, FLIP)
+            name: spearmanr(renders.predicted, best).statistic
+            for name, best in renders.best.items()
         },
-        least_exponent=exponents.min(),
-        largest_exponent=exponents.max(),
+        exponent={"least": exponents.min(), "largest": exponents.max()},
         constants=_constant_table(constants),
-        student={gamma: environment.ratio(beckmann, one) for gamma, one in students.items()},
+        student={gamma: _student_ratio(gamma) for gamma in (3, 5, 20)},
         rough=ROUGH,
         deviation=[min(deviations), max(deviations)],
-        shifted=np.max(np.abs(_fitted("blinn-phong", _M_B, "environment") / (2 / _M_B**2 - 1) - 1)),
+        shifted=np.abs(_fitted("blinn-phong", _M_B, "environment") / (2 / _M_B**2 - 1) - 1).max(),
         **figures,
     )
     columns = {"m_b": renders.m_b, "predicted": renders.predicted, "exponent": exponents}
@@ -88,23 +86,19 @@ def lights() -> Contents:
         {"environment": name} | row
         for name, row in zip(renders.environment, rounded_rows(columns), strict=True)
     ]
-    rows = [
-        {
-            "from": one.source.name,
-            "to": one.target.name,
-            "constant": float(f"{one.constant:.6g}"),
-            "power": one.power,
-            "exact": one.exact,
-            f"deviation at m_B {ROUGH:g}": float(f"{one.deviation:.4g}"),
-        }
-        for one in constants
-    ]
+    rows = [one.record() for one in constants]
     tables = [csv_text(list(table[0]), table) for table in (cases, rows)]
     return Contents([page, *tables, draw_lights(renders, exponents, metrics)], figures)
 
 
 def _fitted(target: str, m_b: Array, metric: str) -> Array:
     return fit(distribution("beckmann"), m_b, distribution(target), metric_named(metric)).parameter
+
+
+def _student_ratio(gamma: float) -> float | None:
+    """Return the α of a Student-t lobe over Beckmann's m_B, at every roughness."""
+    target = distribution("student-t").with_gamma(gamma)
+    return metric_named("environment").ratio(distribution("beckmann"), target)
 
 
 def cost_table(renders: Renders) -> str:
@@ -134,24 +128,10 @@ def prediction_error(renders: Renders) -> list[float]:
     return [float(np.percentile(error, share)) for share in (50, 90, 100)]
 
 
-def rank_correlation(one: Array, other: Array) -> float:
-    """Return Spearman's coefficient; to import scipy.stats would take longer than the page."""
-    return float(np.corrcoef(_ranks(one), _ranks(other))[0, 1])
-
-
-def _ranks(values: Array) -> Array:
-    """Return the ranks, equal ones the mean of theirs."""
-    _, place, counts = np.unique(values, return_inverse=True, return_counts=True)
-    return (np.cumsum(counts) - 0.5 * (counts - 1))[place]
-
-
 def _constant_table(constants: Sequence[SmoothConstant]) -> str:
     """Return the laws from and to the distributions shown, with a row for each other one."""
     laws = {
-        (
-            one.source,
-            one.target,
-        ): f"{one.law} ({f'{one.deviation:+.1%}' if not one.exact else 'exact'})"
+        (one.source, one.target): f"{one.law} ({'exact' if one.exact else f'{one.deviation:+.1%}'})"
         for one in constants
     }
     names = {one.source: f"{one.source.name} {one.source.parameter.symbol}" for one in constants}

@@ -4,7 +4,6 @@ import mpmath as mp
 import numpy as np
 import pytest
 from scipy.special import k1
-from scipy.stats import spearmanr
 
 import mdfconv
 from mdfconv.studies.lights import (
@@ -14,7 +13,7 @@ from mdfconv.studies.lights import (
     read_renders,
     smooth_constants,
 )
-from mdfconv.studies.lights_page import cost_table, prediction_error, rank_correlation
+from mdfconv.studies.lights_page import cost_table, prediction_error
 
 # Mean (worst) costs at α/m_B = 0.647, 0.781, 0.925, 1 and 1.2, m_B = 0.1, 0.2 and 0.4.
 COSTS = {
@@ -54,13 +53,6 @@ def test_prediction():
     assert round(100 * median, 1) == 2.6
     assert round(100 * most) == 11
     assert round(100 * largest) == 18
-
-
-def test_rank_correlation():
-    renders = read_renders()
-    for best in renders.best.values():  # with ties
-        expected = spearmanr(renders.predicted, best).statistic
-        assert rank_correlation(renders.predicted, best) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(("ratio", "rule"), RULES.items())

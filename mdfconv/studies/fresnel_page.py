@@ -12,7 +12,7 @@ from mdfconv.distributions.evaluation import Array
 from mdfconv.output.figures import PAGE, encoded, new_figure
 from mdfconv.output.records import csv_text, markdown_text, rounded_rows
 from mdfconv.studies.fresnel import EDGES, FresnelFit, fit, grid, rescaled
-from mdfconv.studies.pages import Contents, fill
+from mdfconv.studies.pages import Contents, fill, pivot
 
 COLUMNS = ("curve", "a", "b", "weighted_rms", "cosine", "max_error", "rms_error")
 _DRAWN_IORS = (1.33, 1.4, 1.5)  # water, the article's, glass
@@ -52,10 +52,10 @@ def fresnel() -> Contents:
         {name: "" if row[name] is None else row[name] for name in COLUMNS[:4]}
         for row in rows[:: len(EDGES)]
     ]
-    ranges: dict[str, dict[str, str]] = {}
-    for row in rows:
-        cells = ranges.setdefault(row["cosine"], {"l·H": row["cosine"]})
-        cells[row["curve"]] = f"{row['max_error']:.3f} ({row['rms_error']:.3f})"
+    ranges = [
+        (row["cosine"], row["curve"], f"{row['max_error']:.3f} ({row['rms_error']:.3f})")
+        for row in rows
+    ]
     off = np.abs(np.divide((fitted.a, fitted.b), SMOOTHIE_FIT) - 1).max()
     figures = {"a": fitted.a, "b": fitted.b, "off": float(off)}
     page = fill(
@@ -65,7 +65,7 @@ def fresnel() -> Contents:
         least=2**fitted.a,
         gaussian=rows[-1]["max_error"],
         constants=markdown_text(COLUMNS[:4], constants),
-        ranges=markdown_text(["l·H", *_STYLES], list(ranges.values())),
+        ranges=pivot("l·H", ranges),
         **figures,
     )
     cosine = np.linspace(0, 1, _POINTS)

@@ -15,7 +15,7 @@ from mdfconv.studies.furnace import (
     furnace_model,
     printed_energy_response,
 )
-from mdfconv.studies.pages import Contents, fill
+from mdfconv.studies.pages import Contents, fill, pivot
 
 _COSINES = np.linspace(0, 1, 21)
 # The rows of the cosines that the page shows: 0, 0.1, 0.5 and 1.
@@ -64,9 +64,9 @@ def furnace() -> Contents:
         for label, values in group.items()
     }
     shown = [
-        {"BRDF": name}
-        | {f"cos θ = {_COSINES[row]:g}": f"{values[row]:.4g}" for row in _SHOWN.values()}
+        (name, f"cos θ = {_COSINES[row]:g}", f"{values[row]:.4g}")
         for name, values in columns.items()
+        for row in _SHOWN.values()
     ]
     responses = [
         {"α": alpha, "integral": energy_response(alpha), "printed": printed_energy_response(alpha)}
@@ -75,7 +75,7 @@ def furnace() -> Contents:
     page = fill(
         "furnace",
         largest=max(max(values) for name, values in columns.items() if name.startswith("Smoothie")),
-        albedos=markdown_text(list(shown[0]), shown),
+        albedos=pivot("BRDF", shown),
         responses=markdown_text(list(responses[0]), responses),
         **{
             angle: {label: values[row] for label, values in albedos.items()}

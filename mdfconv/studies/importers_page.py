@@ -22,7 +22,7 @@ from mdfconv.scene.shininess import (
     importer_roughness,
     roughness_of,
 )
-from mdfconv.studies.pages import Contents, fill
+from mdfconv.studies.pages import Contents, fill, pivot
 
 _EXPONENTS = np.geomspace(1, 1e4, 81)
 # Of the roughness that is asked for.
@@ -41,22 +41,19 @@ _DASHES = ("-", (0, (6, 2)), (0, (2, 1)), "-.")
 
 def importers() -> Contents:
     """Return what importers make of a Wavefront exponent, beside the best fit."""
-    curves = _curves()
-    answers, rules = _answers(), _rules()
+    curves, rules = _curves(), _rules()
     low, high = float(_EXPONENTS[0]), float(_EXPONENTS[-1])
     light = metric_named(_LIGHT)
     formula = cheapest(SearchProblem(*endpoints(SHININESS, ROUGHNESS), light, low, high), 0.01)
-    at_100 = {
-        name: float(roughness[np.argmin(np.abs(curves["Ns"] - 100))])
-        for name, roughness in curves.items()
-    }
-    ratios = np.array([at_100[rule] / at_100[_LIGHT] for rule in IMPORTERS])
+    at_100 = {rule["importer"]: rule["roughness_100"] for rule in rules}
+    right = float(roughness_of(np.array([100.0]), light)[0])
     figures = {
-        "rules": len(IMPORTERS),
-        "lowest": min(rule["roughness_100"] for rule in rules),
-        "highest": max(rule["roughness_100"] for rule in rules),
-        "right": at_100[_LIGHT],
+        "rules": len(rules),
+        "lowest": min(at_100.values()),
+        "highest": max(at_100.values()),
+        "right": right,
     }
+    exponents = np.array([1.0, *EXPONENTS, 10000])
     page = fill(
         "importers",
         constant=formula.numerator[0],
@@ -65,11 +62,20 @@ def importers() -> Contents:
         formula_error=formula.error,
         low=low,
         high=high,
-        about_right=int((np.abs(ratios - 1) < _ABOUT_RIGHT).sum()),
+        about_right=sum(abs(value / right - 1) < _ABOUT_RIGHT for value in at_100.values()),
         tolerance=_ABOUT_RIGHT,
         mirrors=sum(bool((curves[rule] < _MIRROR).any()) for rule in IMPORTERS),
         rule_table=markdown_text(list(rules[0]), rules),
-        answers=markdown_text(list(answers[0]), answers),
+        answers=pivot(
+            "Ns",
+            (
+                (f"{exponent:g}", name, f"{roughness:.4g}")
+                for name in _OURS
+                for exponent, roughness in zip(
+                    exponents, roughness_of(exponents, metric_named(name)), strict=True
+                )
+            ),
+        ),
         **figures,
     )
     return Contents([page, csv_text(list(curves), rounded_rows(curves)), _draw(curves)], figures)
@@ -85,16 +91,6 @@ def _curves() -> dict[str, Array]:
         for name in (*IMPORTERS, _LIGHT)
     }
     return {"Ns": _EXPONENTS} | roughness | errors
-
-
-def _answers() -> list[dict[str, str]]:
-    """Return the right roughness of some exponents under each metric."""
-    shown = np.array([1.0, *EXPONENTS, 10000])
-    columns = {name: roughness_of(shown, metric_named(name)) for name in _OURS}
-    return [
-        {"Ns": f"{n:g}"} | {name: f"{columns[name][row]:.4g}" for name in _OURS}
-        for row, n in enumerate(shown)
-    ]
 
 
 def _rules() -> list[dict[str, Any]]:

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions import distribution
+from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.fitting.solve import fit
 from mdfconv.output.figures import PAGE, encoded, new_figure
-from mdfconv.output.records import csv_text, markdown_text, rounded_rows
+from mdfconv.output.records import csv_text, rounded_rows
 from mdfconv.studies.lights import (
     FLIP,
     LINEAR,
@@ -26,7 +26,7 @@ from mdfconv.studies.lights import (
     read_renders,
     smooth_constants,
 )
-from mdfconv.studies.pages import Contents, fill
+from mdfconv.studies.pages import Contents, fill, pivot
 
 # Where N = 2/m_B² − 1 is compared with the fit.
 _M_B = np.geomspace(0.01, ROUGH, 17)
@@ -103,23 +103,19 @@ def _student_ratio(gamma: float) -> float | None:
 
 def cost_table(renders: Renders) -> str:
     """Return the mean and the worst costs of the rules by measure and m_B, as Markdown."""
-    names = "mean over lights (worst)", *(f"{ratio} {rule}" for ratio, rule in RULES.items())
     groups = {
         f"{measure}, m_B {m_b:g}": costs[renders.m_b == m_b]
         for measure, costs in renders.costs.items()
         for m_b in np.unique(renders.m_b)
     }
     groups["all"] = np.concatenate(list(renders.costs.values()))
-    rows = []
+    cells = []
     for label, cost in groups.items():
-        mean = np.exp(np.mean(np.log(cost), axis=0))  # geometric: costs are ratios
-        cells = [f"{one:.2f}" for one in mean]
-        cells[np.argmin(mean)] = f"**{cells[np.argmin(mean)]}**"
-        shown = [
-            f"{cell} ({worst:.2f})" for cell, worst in zip(cells, cost.max(axis=0), strict=True)
-        ]
-        rows.append(dict(zip(names, [label, *shown], strict=True)))
-    return markdown_text(names, rows)
+        means = np.exp(np.mean(np.log(cost), axis=0))  # geometric: costs are ratios
+        for (ratio, rule), mean, worst in zip(RULES.items(), means, cost.max(axis=0), strict=True):
+            text = f"**{mean:.2f}**" if mean == means.min() else f"{mean:.2f}"
+            cells.append((label, f"{ratio} {rule}", f"{text} ({worst:.2f})"))
+    return pivot("mean over lights (worst)", cells)
 
 
 def prediction_error(renders: Renders) -> list[float]:
@@ -130,19 +126,20 @@ def prediction_error(renders: Renders) -> list[float]:
 
 def _constant_table(constants: Sequence[SmoothConstant]) -> str:
     """Return the laws from and to the distributions shown, with a row for each other one."""
-    laws = {
-        (one.source, one.target): f"{one.law} ({'exact' if one.exact else f'{one.deviation:+.1%}'})"
-        for one in constants
-    }
-    names = {one.source: f"{one.source.name} {one.source.parameter.symbol}" for one in constants}
-    rows = []
-    for other in names:
-        row = {"distribution": names[other]}
-        for shown in (one for one in names if one.name in _SHOWN):
-            row[f"from {names[shown]}"] = laws.get((shown, other), "")
-            row[f"to {names[shown]}"] = laws.get((other, shown), "")
-        rows.append(row)
-    return markdown_text(list(rows[0]), rows)
+    cells = []
+    for shown in _SHOWN:
+        for word in ("from", "to"):
+            for one in constants:
+                this, other = (one.source, one.target)[:: 1 if word == "from" else -1]
+                if this.name == shown:
+                    note = "exact" if one.exact else f"{one.deviation:+.1%}"
+                    column = f"{word} {_with_symbol(this)}"
+                    cells.append((_with_symbol(other), column, f"{one.law} ({note})"))
+    return pivot("distribution", cells)
+
+
+def _with_symbol(mdf: Distribution) -> str:
+    return f"{mdf.name} {mdf.parameter.symbol}"
 
 
 def draw_lights(

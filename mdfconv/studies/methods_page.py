@@ -15,10 +15,10 @@ from mdfconv.distributions import Distribution, one_parameter_distributions
 from mdfconv.distributions.equivalence import exact_route
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
-from mdfconv.output.records import csv_text, markdown_text
+from mdfconv.output.records import csv_text
 from mdfconv.recommend import answers
 from mdfconv.studies.bench import as_wide
-from mdfconv.studies.pages import Contents, fill
+from mdfconv.studies.pages import Contents, fill, pivot
 
 # Beckmann's m_B for lobes of the same half width.
 _RANGES = {
@@ -115,8 +115,14 @@ def _row(key: tuple[str, str, str], pairs: Sequence[Array]) -> dict[str, Any]:
 
 def _table(rows: Sequence[dict[str, Any]]) -> str:
     """Return median and worst errors with a row for each method and a column for each metric."""
-    lines: dict[str, dict[str, Any]] = {}
-    for row in rows:
-        line = lines.setdefault(row["method"], {"method": row["method"], "pairs": row["pairs"]})
-        line[row["metric"]] = f"{row['median']:.1%} ({row['worst']:.0%})"
-    return markdown_text(list(next(iter(lines.values()))), list(lines.values()))
+    return pivot(
+        "method",
+        (
+            (
+                f"{row['method']}, {row['pairs']} pairs",
+                row["metric"],
+                f"{row['median']:.1%} ({row['worst']:.0%})",
+            )
+            for row in rows
+        ),
+    )

@@ -6,10 +6,12 @@ figure ``error``, with Python's rules of format; a table is the figure ``{table}
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from string import Formatter
 from typing import NamedTuple
+
+from mdfconv.output.records import markdown_text
 
 
 class Contents(NamedTuple):
@@ -34,3 +36,12 @@ def fill(name: str, **figures: object) -> str:
         missing, spare = sorted(used - figures.keys()), sorted(figures.keys() - used)
         raise ValueError(f"pages/{name}.md: figures missing {missing}, without use {spare}")
     return template.rstrip("\n").format_map(figures)
+
+
+def pivot(corner: str, cells: Iterable[tuple[str, str, str]]) -> str:
+    """Return cells of a row, a column and a text as a Markdown table, in the order given."""
+    rows: dict[str, dict[str, str]] = {}
+    for row, column, text in cells:
+        rows.setdefault(row, {corner: row})[column] = text
+    columns = dict.fromkeys(column for row in rows.values() for column in row)
+    return markdown_text([*columns], [dict.fromkeys(columns, "") | row for row in rows.values()])

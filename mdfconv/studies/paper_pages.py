@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from operator import itemgetter
 from typing import Any
 
 from mdfconv.conversion import convert
@@ -22,7 +22,7 @@ from mdfconv.render.page import filled, page_data
 from mdfconv.scene.shininess import ROUGHNESS
 from mdfconv.studies.closed_forms import refit_rows
 from mdfconv.studies.error_curves import Curves, curves, draw_errors
-from mdfconv.studies.pages import Contents, fill
+from mdfconv.studies.pages import Contents, fill, pivot
 from mdfconv.studies.table2 import AGREEMENT, COLUMNS, fit_table, paper_sweep, printed_cells
 
 _UNIT = "unit"
@@ -36,7 +36,7 @@ _FIGURE_DPI, _PICTURE_SIZE = 110, 192
 def table2() -> Contents:
     """Return Table 2 and the printed cells that do not come back."""
     rows = fit_table(*paper_sweep(), metric_named(_UNIT))
-    cells = [asdict(cell) for cell in printed_cells(rows)]
+    cells = [vars(cell) for cell in printed_cells(rows)]
     missed = [cell for cell in cells if not cell["agrees"]]
     columns = [name for name in cells[0] if name != "agrees"]
     figures = {
@@ -76,27 +76,24 @@ def table2_by_metric() -> Contents:
 def closed_forms() -> Contents:
     """Return the paper's coefficients beside refitted ones."""
     rows = refit_rows([metric_named(name) for name in list_metrics()])
-    printed: dict[str, dict[str, Any]] = {}
-    refitted: dict[str, dict[str, Any]] = {}
-    worst: dict[str, dict[str, float]] = {"worst_printed": {}, "worst_refitted": {}}
-    for row in rows:
-        formula, metric = {"formula": row["formula"]}, row["metric"]
-        line = printed.setdefault(row["formula"], formula | {"a, b": row["printed"]})
-        line[metric] = f"{row['worst_printed']:.2%}"
-        line = refitted.setdefault(row["formula"], dict(formula))
-        line[metric] = f"{row['refitted']} ({row['worst_refitted']:.2%})"
-        for name, largest in worst.items():
-            largest[metric] = max(row[name], largest.get(metric, 0))
+    coefficients = [(row["formula"], "a, b", row["printed"]) for row in rows]
+    printed = [(row["formula"], row["metric"], f"{row['worst_printed']:.2%}") for row in rows]
+    refitted = [
+        (row["formula"], row["metric"], f"{row['refitted']} ({row['worst_refitted']:.2%})")
+        for row in rows
+    ]
+    worst = {
+        error: {row["metric"]: row[error] for row in sorted(rows, key=itemgetter(error))}
+        for error in ("worst_printed", "worst_refitted")
+    }
     page = fill(
-        "closed-forms", printed_table=_table(printed), refitted_table=_table(refitted), **worst
+        "closed-forms",
+        printed=pivot("formula", coefficients + printed),
+        refitted=pivot("formula", refitted),
+        **worst,
     )
-    shown = [row | {name: f"{row[name]:.4g}" for name in worst} for row in rows]
+    shown = [row | {error: f"{row[error]:.4g}" for error in worst} for row in rows]
     return Contents([page, csv_text(list(shown[0]), shown)], worst)
-
-
-def _table(rows: dict[str, dict[str, Any]]) -> str:
-    lines = list(rows.values())
-    return markdown_text(list(lines[0]), lines)
 
 
 def errors() -> Contents:

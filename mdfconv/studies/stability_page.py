@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from operator import attrgetter
 
-from mdfconv.output.records import csv_text, markdown_text
-from mdfconv.studies.pages import Contents, fill
+from mdfconv.output.records import csv_text
+from mdfconv.studies.pages import Contents, fill, pivot
 from mdfconv.studies.stability import Finding, audit
 
 _COLUMNS = ("distribution", "rule", "regime", "dtype", "cases", "out_of_range", "error", "textbook")
@@ -47,20 +47,14 @@ def stability() -> Contents:
 
 def _table(findings: Sequence[Finding], row: str, column: str) -> str:
     """Return the worst errors, ours and the textbook's, by two fields of a finding."""
-    groups: dict[str, dict[str, list[Finding]]] = {}
+    groups: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
-        name, cell = attrgetter(row, column)(finding)
-        groups.setdefault(name, {}).setdefault(cell, []).append(finding)
-    columns = list(dict.fromkeys(cell for cells in groups.values() for cell in cells))
-    lines = [
-        {row: name} | {cell: _worst(cells.get(cell, [])) for cell in columns}
-        for name, cells in groups.items()
-    ]
-    return markdown_text([row, *columns], lines)
+        groups.setdefault(attrgetter(row, column)(finding), []).append(finding)
+    return pivot(row, ((*key, _worst(group)) for key, group in groups.items()))
 
 
 def _worst(group: Sequence[Finding]) -> str:
-    if group and not any(finding.cases for finding in group):
+    if not any(finding.cases for finding in group):
         return _NO_REFERENCES
     ours = [_magnitude(finding.error) for finding in group]
     textbook = [_magnitude(finding.textbook) for finding in group]

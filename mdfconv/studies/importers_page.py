@@ -53,7 +53,11 @@ def importers() -> Contents:
         "highest": max(at_100.values()),
         "right": right,
     }
-    exponents = np.array([1.0, *EXPONENTS, 10000])
+    answers = [
+        (f"{n:g}", name, f"{roughness_of(np.array([n]), metric_named(name))[0]:.4g}")
+        for n in map(float, (1, *EXPONENTS, 10000))
+        for name in _OURS
+    ]
     page = fill(
         "importers",
         constant=formula.numerator[0],
@@ -66,16 +70,7 @@ def importers() -> Contents:
         tolerance=_ABOUT_RIGHT,
         mirrors=sum(bool((curves[rule] < _MIRROR).any()) for rule in IMPORTERS),
         rule_table=markdown_text(list(rules[0]), rules),
-        answers=pivot(
-            "Ns",
-            (
-                (f"{exponent:g}", name, f"{roughness:.4g}")
-                for name in _OURS
-                for exponent, roughness in zip(
-                    exponents, roughness_of(exponents, metric_named(name)), strict=True
-                )
-            ),
-        ),
+        answers=pivot("Ns", answers),
         **figures,
     )
     return Contents([page, csv_text(list(curves), rounded_rows(curves)), _draw(curves)], figures)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions import Distribution, distribution
+from mdfconv.distributions import distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.fitting.solve import fit
@@ -127,19 +127,14 @@ def prediction_error(renders: Renders) -> list[float]:
 def _constant_table(constants: Sequence[SmoothConstant]) -> str:
     """Return the laws from and to the distributions shown, with a row for each other one."""
     cells = []
-    for shown in _SHOWN:
-        for word in ("from", "to"):
-            for one in constants:
-                this, other = (one.source, one.target)[:: 1 if word == "from" else -1]
-                if this.name == shown:
-                    note = "exact" if one.exact else f"{one.deviation:+.1%}"
-                    column = f"{word} {_with_symbol(this)}"
-                    cells.append((_with_symbol(other), column, f"{one.law} ({note})"))
+    for one in constants:
+        source, target = (f"{mdf.name} {mdf.parameter.symbol}" for mdf in (one.source, one.target))
+        text = f"{one.law} ({'exact' if one.exact else f'{one.deviation:+.1%}'})"
+        if one.source.name in _SHOWN:
+            cells.append((target, f"from {source}", text))
+        if one.target.name in _SHOWN:
+            cells.append((source, f"to {target}", text))
     return pivot("distribution", cells)
-
-
-def _with_symbol(mdf: Distribution) -> str:
-    return f"{mdf.name} {mdf.parameter.symbol}"
 
 
 def draw_lights(

@@ -115,14 +115,8 @@ def _row(key: tuple[str, str, str], pairs: Sequence[Array]) -> dict[str, Any]:
 
 def _table(rows: Sequence[dict[str, Any]]) -> str:
     """Return median and worst errors with a row for each method and a column for each metric."""
-    return pivot(
-        "method",
-        (
-            (
-                f"{row['method']}, {row['pairs']} pairs",
-                row["metric"],
-                f"{row['median']:.1%} ({row['worst']:.0%})",
-            )
-            for row in rows
-        ),
-    )
+    cells = []
+    for row in rows:
+        label = f"{row['method']}, {row['pairs']} pairs"
+        cells.append((label, row["metric"], f"{row['median']:.1%} ({row['worst']:.0%})"))
+    return pivot("method", cells)

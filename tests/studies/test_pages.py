@@ -119,3 +119,19 @@ def test_commands_are_quoted():
 )
 def test_numbers_are_compared_as_shown(out, agrees):
     assert on_page(out, "The right one is 0.3315; the worst error is 2.01%, with 1 of 7.") is agrees
+
+
+def test_each_fit_is_best_at_what_it_preserves():
+    """As pictures.md says, of every distribution on both surfaces."""
+    lines = (REPORTS / "pictures.md").read_text().splitlines()
+    names, _, *rows = [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in lines if line[:1] == "|"
+    ]
+    groups = {}
+    for row in [dict(zip(names, cells, strict=True)) for cells in rows]:
+        groups.setdefault((row["figure"], row["distribution"]), []).append(row)
+    assert len(groups) == 10
+    for group in groups.values():
+        for error, conversion in (("rmse_linear", "energy"), ("rmse_displayed", "display")):
+            best = min(group, key=lambda row, error=error: float(row[error]))
+            assert best["conversion"].startswith(f"fit {conversion}")

@@ -18,8 +18,7 @@ TERMINAL = {"typer", "rich", "click"}
 # Modules that may name distributions, because they are about those particular ones.
 ABOUT_PARTICULAR_ONES = {
     "conversion/methods.py": "the formulas of Sawicki 2021 and the rule of Ward 1996",
-    "studies/table2.py": "the columns of the paper's table",
-    "studies/closed_forms.py": "the paper's formulas, refitted",
+    "studies/table2.py": "the columns of the paper's table, and its formulas",
     "studies/error_curves.py": "the paper's figures",
     "studies/paper_pages.py": "the paper's prose",
     "render/comparison.py": "the names of BRDFs",

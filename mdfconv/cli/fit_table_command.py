@@ -88,7 +88,7 @@ def command(
     outputs = Outputs(table=output, force=force, inputs=kept.inputs)
     rows: list[dict[str, Any]]
     if closed_forms:
-        from mdfconv.studies.closed_forms import refit_rows
+        from mdfconv.studies.table2 import refit_rows
 
         rows = refit_rows(every_metric(exposure))
         title = "Closed forms: coefficients and worst relative error"

@@ -12,7 +12,7 @@ from mdfconv.conversion import convert
 from mdfconv.distributions import distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.output.figures import encoded, line_style, new_figure
 from mdfconv.output.records import csv_text, rounded_rows
 from mdfconv.render.comparison import lobe_extent
@@ -65,7 +65,9 @@ def parameters_for(
     return {name: float(convert(m_b, "beckmann", name, method, metric=metric)) for name in names}
 
 
-def curves(parameters: Mapping[str, float], metric: Metric, points: int) -> Curves:
+def curves(
+    parameters: Mapping[str, float], metric: Metric | str = "unit", points: int = 1001
+) -> Curves:
     """Evaluate distributions on a range of β that follows the lobe of the first, the reference.
 
     The unit metric compares unit forms, as the paper; others what they compare in a fit. The
@@ -78,6 +80,7 @@ def curves(parameters: Mapping[str, float], metric: Metric, points: int) -> Curv
     """
     if not 2 <= points <= _MOST_POINTS:
         raise MdfconvError(f"the number of points is from 2 to {_MOST_POINTS}")
+    metric = metric_named(metric)
     if not metric.over_angles:
         raise MdfconvError(f"{metric} compares spectra: it has no curves over β")
     arrays = {name: np.array([float(value)]) for name, value in parameters.items()}

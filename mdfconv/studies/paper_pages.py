@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from operator import itemgetter
 from typing import Any
 
 from mdfconv.conversion import convert
@@ -20,13 +19,18 @@ from mdfconv.render.comparison import (
 from mdfconv.render.comparison_figure import draw_comparison
 from mdfconv.render.page import filled, page_data
 from mdfconv.scene.shininess import ROUGHNESS
-from mdfconv.studies.closed_forms import refit_rows
 from mdfconv.studies.error_curves import Curves, curves, draw_errors
 from mdfconv.studies.pages import Contents, fill, pivot
-from mdfconv.studies.table2 import AGREEMENT, COLUMNS, fit_table, paper_sweep, printed_cells
+from mdfconv.studies.table2 import (
+    AGREEMENT,
+    COLUMNS,
+    fit_table,
+    paper_sweep,
+    printed_cells,
+    refit_rows,
+)
 
 _UNIT = "unit"
-_POINTS = 1001
 # The paper states the largest error of Blinn/Phong for these exponents.
 _STATED = (10, 40, 100, 1000)
 # Small enough to be committed, large enough to see the difference.
@@ -83,7 +87,10 @@ def closed_forms() -> Contents:
         for row in rows
     ]
     worst = {
-        error: {row["metric"]: row[error] for row in sorted(rows, key=itemgetter(error))}
+        error: {
+            metric: max(row[error] for row in rows if row["metric"] == metric)
+            for metric in list_metrics()
+        }
         for error in ("worst_printed", "worst_refitted")
     }
     page = fill(
@@ -98,24 +105,20 @@ def closed_forms() -> Contents:
 
 def errors() -> Contents:
     """Return Figures 1 and 2, and their maxima beside the paper's prose."""
-    drawn = {name: _curves(parameters) for name, parameters in PAPER_SETS.items()}
+    drawn = {name: curves(parameters) for name, parameters in PAPER_SETS.items()}
     maxima = [{"figure": name} | row for name, each in drawn.items() for row in each.maxima()]
     stated = {
         n: {REFERENCE: convert(n, "blinn-phong", REFERENCE), "blinn-phong": n} for n in _STATED
     }
     figures: dict[str, Any] = {name: _largest(each) for name, each in drawn.items()}
     figures["blinn_phong"] = {
-        n: _largest(_curves(pair))["blinn-phong"] for n, pair in stated.items()
+        n: _largest(curves(pair))["blinn-phong"] for n, pair in stated.items()
     }
     page = fill("errors", maxima=markdown_text(list(maxima[0]), maxima), **figures)
     files: list[str | bytes] = [page]
     for name, each in drawn.items():
         files += [draw_errors(each, f"Sawicki 2021, {name}", dpi=_FIGURE_DPI), each.error_text()]
     return Contents(files, figures)
-
-
-def _curves(parameters: Any) -> Curves:
-    return curves(parameters, metric_named(_UNIT), _POINTS)
 
 
 def _largest(drawn: Curves) -> dict[str, float]:

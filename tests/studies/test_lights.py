@@ -6,14 +6,15 @@ import pytest
 from scipy.special import k1
 
 import mdfconv
-from mdfconv.studies.lights import (
+from mdfconv.studies.lights_page import (
     RULES,
     best_ratio,
+    cost_table,
     equivalent_exponent,
+    prediction_error,
     read_renders,
     smooth_constants,
 )
-from mdfconv.studies.lights_page import cost_table, prediction_error
 
 # Mean (worst) costs at α/m_B = 0.647, 0.781, 0.925, 1 and 1.2, m_B = 0.1, 0.2 and 0.4.
 COSTS = {

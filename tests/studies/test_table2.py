@@ -7,8 +7,14 @@ import numpy as np
 import pytest
 
 from mdfconv.fitting.metrics import metric_named
-from mdfconv.studies.closed_forms import refit
-from mdfconv.studies.table2 import COLUMNS, angle_limit, fit_table, paper_sweep, printed_cells
+from mdfconv.studies.table2 import (
+    COLUMNS,
+    angle_limit,
+    fit_table,
+    paper_sweep,
+    printed_cells,
+    refit,
+)
 from tests.cli.runner import run
 
 # The cells that do not come back: row N, column.

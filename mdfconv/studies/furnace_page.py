@@ -21,47 +21,52 @@ _COSINES = np.linspace(0, 1, 21)
 # The rows of the cosines that the page shows: 0, 0.1, 0.5 and 1.
 _SHOWN = {"grazing": 0, "nearly_grazing": 2, "oblique": 10, "normal": 20}
 _GAMMA, _ALPHA = 20.0, 0.5
-_EXACT = ("modified, Arvo", "modified, Mallett & Yuksel")
-_SMOOTH, _ROUGH = 0.1, 1.0
-# Panels of the figure: title, and for each curve a label and its model.
-_PANELS: dict[str, dict[str, tuple[str, float, dict[str, str]]]] = {
-    f"Phong, γ = {_GAMMA:g}": {
-        "original": ("phong", _GAMMA, {}),
-        "modified, usual": ("modified-phong", _GAMMA, {"normalizer": "usual"}),
-        "modified, Arvo": ("modified-phong", _GAMMA, {"normalizer": "arvo"}),
-        "modified, Mallett & Yuksel": ("modified-phong", _GAMMA, {"normalizer": "mallett-yuksel"}),
-    },
-    f"GGX, α = {_ALPHA:g}, by masking": {
-        name: ("ggx", _ALPHA, {"masking": name}) for name in MASKINGS.names
-    },
-    "GGX and Beckmann, correlated": {
-        f"{name} {alpha:g}": (name, alpha, {})
-        for name in ("ggx", "beckmann")
-        for alpha in (_SMOOTH, _ROUGH)
-    },
-    "Smoothie": {
-        f"{name} {alpha:g}": (name, alpha, {})
-        for name in ("smoothie", "smoothie-approx")
-        for alpha in (_SMOOTH, _ROUGH)
-    },
+_EXACT = ("Phong: modified, Arvo", "Phong: modified, Mallett & Yuksel")
+_Models = dict[str, tuple[str, float, dict[str, str]]]
+
+
+def _smooth_and_rough(*names: str) -> _Models:
+    return {f"{name} {alpha:g}": (name, alpha, {}) for name in names for alpha in (0.1, 1.0)}
+
+
+# Panels of the figure by name: the title, and for each curve a label and its model.
+_PANELS: dict[str, tuple[str, _Models]] = {
+    "Phong": (
+        f"Phong, γ = {_GAMMA:g}",
+        {
+            "original": ("phong", _GAMMA, {}),
+            "modified, usual": ("modified-phong", _GAMMA, {"normalizer": "usual"}),
+            "modified, Arvo": ("modified-phong", _GAMMA, {"normalizer": "arvo"}),
+            "modified, Mallett & Yuksel": (
+                "modified-phong",
+                _GAMMA,
+                {"normalizer": "mallett-yuksel"},
+            ),
+        },
+    ),
+    "GGX": (
+        f"GGX, α = {_ALPHA:g}, by masking",
+        {name: ("ggx", _ALPHA, {"masking": name}) for name in MASKINGS.names},
+    ),
+    "GGX and Beckmann": ("GGX and Beckmann, correlated", _smooth_and_rough("ggx", "beckmann")),
+    "Smoothie": ("Smoothie", _smooth_and_rough("smoothie", "smoothie-approx")),
 }
 _RESPONSE_ALPHAS = (0.01, 0.1, 0.25, 0.5, 1.0)
 
 
 def furnace() -> Contents:
     """Return the white furnace of the BRDFs."""
-    panels = {
-        title: {
+    albedos = {
+        panel: {
             label: directional_albedo(furnace_model(name, parameter, **options), _COSINES).tolist()
             for label, (name, parameter, options) in models.items()
         }
-        for title, models in _PANELS.items()
+        for panel, (_, models) in _PANELS.items()
     }
-    albedos = {label: values for group in panels.values() for label, values in group.items()}
     columns = {
-        f"{title.split(',')[0]}: {label}": values
-        for title, group in panels.items()
-        for label, values in group.items()
+        f"{panel}: {label}": values
+        for panel, curves in albedos.items()
+        for label, values in curves.items()
     }
     shown = [
         (name, f"cos θ = {_COSINES[row]:g}", f"{values[row]:.4g}")
@@ -74,11 +79,11 @@ def furnace() -> Contents:
     ]
     page = fill(
         "furnace",
-        largest=max(max(values) for name, values in columns.items() if name.startswith("Smoothie")),
+        largest=max(map(max, albedos["Smoothie"].values())),
         albedos=pivot("BRDF", shown),
         responses=markdown_text(list(responses[0]), responses),
         **{
-            angle: {label: values[row] for label, values in albedos.items()}
+            angle: {name: values[row] for name, values in columns.items()}
             for angle, row in _SHOWN.items()
         },
     )
@@ -87,8 +92,9 @@ def furnace() -> Contents:
         | {name: float(f"{values[row]:.8g}") for name, values in columns.items()}
         for row, cosine in enumerate(_COSINES)
     ]
-    error = max(abs(albedo - 1) for label in _EXACT for albedo in albedos[label])
-    picture = draw_albedo(_COSINES.tolist(), panels)
+    error = max(abs(albedo - 1) for name in _EXACT for albedo in columns[name])
+    titled = {title: albedos[panel] for panel, (title, _) in _PANELS.items()}
+    picture = draw_albedo(_COSINES.tolist(), titled)
     return Contents([page, csv_text(list(rows[0]), rows), picture], {"error": error})
 
 

@@ -16,7 +16,6 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from mdfconv.conversion.explanation import remaining_error
 from mdfconv.distributions import distribution, one_parameter_distributions
@@ -278,6 +277,8 @@ def _coefficients(values: Sequence[float]) -> str:
 
 
 def _refit_one(form: Law, metric: Metric, x: Array, y: Array) -> Refit:
+    from scipy.optimize import least_squares
+
     def relative(coefficients: Array) -> Array:
         return form.shape(x, *coefficients) / y - 1
 

@@ -23,7 +23,7 @@ from mdfconv.studies import bench
 # What is drawn and how long it takes is not the question here.
 Figure.savefig = lambda figure, file, **options: file.write(b"a picture")
 bench.QUICK = bench.Sizes(
-    angles=512, conversions=64, fits=4, loop=2, rounds=2, patience=0.05
+    angles=512, conversions=64, fits=4, loop=2, rounds=2
 )
 
 answers = []

@@ -16,8 +16,6 @@ from mdfconv.output.files import file_bytes
 from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
-    from mdfconv.distributions.endpoint import Endpoint
-    from mdfconv.distributions.evaluation import Array
     from mdfconv.studies.bench import Measurements, Task
 
 # The paper's reference, and its common rough and smooth surface.
@@ -112,37 +110,27 @@ def command(
 def _task(
     reference: str, parameter: list[float] | None, source: str, target: str, *, quick: bool
 ) -> Task:
+    import numpy as np
+
+    from mdfconv.conversion import convert
     from mdfconv.distributions import one_parameter_distribution, one_parameter_distributions
     from mdfconv.studies.bench import FULL, QUICK, Task
 
     end = asked_endpoint(reference)
+    mdf = end.distribution
+    if parameter:
+        # The kernels compute in single precision, too.
+        lobes = mdf.parameter.check(end.decode(parameter), mdf.name, np.dtype(np.float32))
+    else:
+        lobes = np.asarray(convert(np.array(_PARAMETERS), _REFERENCE, mdf.name, "half-angle"))
     return Task(
-        reference=end.distribution,
-        parameters=_lobes(end, parameter),
+        reference=mdf,
+        parameters=lobes,
         candidates=tuple(one_parameter_distributions()),
         source=one_parameter_distribution(source),
         target=one_parameter_distribution(target),
         sizes=QUICK if quick else FULL,
     )
-
-
-def _lobes(end: Endpoint, parameter: list[float] | None) -> Array:
-    """Return the parameters of the reference, whose kernels compute in single precision, too."""
-    if not parameter:
-        return _default_lobes(end.distribution.name)
-    import numpy as np
-
-    mdf, single = end.distribution, np.dtype(np.float32)
-    lobes: Array = mdf.parameter.check(end.decode(parameter), mdf.name, single)
-    return lobes
-
-
-def _default_lobes(name: str) -> Array:
-    import numpy as np
-
-    from mdfconv.conversion import convert
-
-    return np.asarray(convert(np.array(_PARAMETERS), _REFERENCE, name, "half-angle"))
 
 
 def _print(measurements: Measurements, form: Format, png: Path | None) -> None:

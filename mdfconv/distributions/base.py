@@ -145,8 +145,6 @@ class Distribution(ABC):
     operations : int
         Arithmetic operations to evaluate the unit form from cos β, the parameter's constants
         precomputed; a transcendental function counts as 10.
-    functions : tuple of str
-        The transcendental functions of NumPy that the kernel cannot avoid.
     anisotropic : bool
         Whether it takes a pair of parameters.
     ambiguous : dict
@@ -171,7 +169,6 @@ class Distribution(ABC):
     parameters: ClassVar[tuple[Parameter, ...]]
     printed: ClassVar[Printed]
     operations: ClassVar[int]
-    functions: ClassVar[tuple[str, ...]] = ("tan",)
     encodings: ClassVar[tuple[Encoding, ...]] = ()
     ambiguous: ClassVar[Mapping[str, str]] = {}
     meant_by: ClassVar[Mapping[str, str]] = {}

@@ -66,7 +66,6 @@ class Beckmann(AnisotropicDistribution):
     source = "Beckmann & Spizzichino 1963; Cook & Torrance 1981"
     parameters = (Parameter("alpha", "m_B", (0.01, 0.8)),)
     operations = 17
-    functions = ("tan", "exp")
     scales_with_slope = True
     smith = True
     encodings = (ROUGHNESS, GLOSSINESS)

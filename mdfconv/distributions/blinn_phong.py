@@ -53,7 +53,6 @@ class BlinnPhong(Distribution):
     parameters = (Parameter("exponent", "N", (1.0, 1e4), larger_is_smoother=True),)
     encodings = (REFLECTED,)
     operations = 20
-    functions = ("tan", "log1p", "exp")
     map_variables = MapVariables(
         width=lambda n: np.sqrt(2 / (n + 2)),
         from_width=lambda x: 2 * (1 - x) * (1 + x) / (x * x),

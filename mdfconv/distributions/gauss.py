@@ -50,7 +50,6 @@ class Gauss(Distribution):
     source = "Torrance & Sparrow 1967"
     parameters = (Parameter("width", "m_G", (0.01, 0.8)),)
     operations = 23
-    functions = ("exp",)
     map_variables = MapVariables(
         width=same,
         from_width=same,

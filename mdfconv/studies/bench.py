@@ -27,7 +27,7 @@ from mdfconv.fitting.quadrature import LobeQuadrature
 from mdfconv.recommend import answers, best, covering, evaluation_times
 from mdfconv.studies.stability import printed_form
 from mdfconv.studies.table2 import paper_sweep
-from mdfconv.timing import Advance, Spread, clock, interleave, spread
+from mdfconv.timing import Advance, Spread, interleave, spread
 
 PRECISIONS = ("float64", "float32")
 # Beside the methods: a loop of scipy.optimize.curve_fit.
@@ -36,8 +36,6 @@ LOOP = "curve_fit"
 _COMPILED = "ggx"
 # The paper's sweep is one of this distribution's m_B.
 _PAPER_SOURCE = "beckmann"
-# A method is tried on this share of the values before it is timed on all of them.
-_TRIED = 0.01
 
 
 @dataclass(frozen=True)
@@ -49,15 +47,13 @@ class Sizes:
     angles : int
         Angles of an evaluation, uniform on [0, π/2].
     conversions : int
-        Values of a conversion by a method that needs no more than `patience` for them.
+        Values of a conversion by a formula, or from what is stored.
     fits : int
-        Values of a conversion by any other method, and of the comparison of results.
+        Values of a conversion by ``"fit"``, and of the comparison of results.
     loop : int
         Values of a loop of scipy.optimize.curve_fit.
     rounds : int
         Repeats that are counted.
-    patience : float
-        Seconds.
     """
 
     angles: int
@@ -65,11 +61,10 @@ class Sizes:
     fits: int
     loop: int
     rounds: int
-    patience: float
 
 
-FULL = Sizes(angles=4_000_000, conversions=1_000_000, fits=256, loop=17, rounds=11, patience=3.0)
-QUICK = Sizes(angles=2_000_000, conversions=100_000, fits=32, loop=5, rounds=5, patience=0.2)
+FULL = Sizes(angles=4_000_000, conversions=100_000, fits=256, loop=17, rounds=11)
+QUICK = Sizes(angles=2_000_000, conversions=100_000, fits=32, loop=5, rounds=5)
 
 
 @dataclass(frozen=True)
@@ -416,7 +411,9 @@ def method_speeds(
     if source.is_same(target):
         raise MdfconvError(f"from {source.name} to {target.name} there is nothing to convert")
     trials = _trials(source, target)
-    values = [_count(trial, source, sizes) for trial in trials]
+    # Among more values most fits come from a curve: here each is found by itself.
+    counts = {LOOP: sizes.loop, "fit": sizes.fits}
+    values = [counts.get(trial.method, sizes.conversions) for trial in trials]
     functions = {
         str(number): partial(trial.convert, sweep(source, count))
         for number, (trial, count) in enumerate(zip(trials, values, strict=True))
@@ -445,19 +442,6 @@ def _trials(source: Distribution, target: Distribution) -> list[_Trial]:
         _Trial(LOOP, metric, partial(curve_fit_loop, source=source, target=target, metric=metric))
         for metric in metrics
     ]
-
-
-def _count(trial: _Trial, source: Distribution, sizes: Sizes) -> int:
-    """Return how many values a method is timed on: many if it is quick."""
-    # Among more values most come from a curve: here each is fitted.
-    counts = {LOOP: sizes.loop, "fit": sizes.fits}
-    if trial.method in counts:
-        return counts[trial.method]
-    few = sweep(source, max(1, round(_TRIED * sizes.conversions)))
-    start = clock()
-    trial.convert(few)
-    quick = (clock() - start) / _TRIED <= sizes.patience
-    return sizes.conversions if quick else sizes.fits
 
 
 def _method_speed(

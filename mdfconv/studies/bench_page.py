@@ -226,16 +226,17 @@ def _label_few_decades(axis: Any) -> None:
 def _draw_panel(axes: Any, points: Iterable[_Point], colors: dict[str, str]) -> None:
     """Draw points with their quartiles, the Pareto front of each variant, and a legend."""
     points = [point for point in points if np.isfinite(point.error)]
-    variants = list(dict.fromkeys(point.variant for point in points))
     shapes = dict(zip(colors, cycle(_MARKERS), strict=False))
-    fills = dict(zip(variants, cycle(_FILLS), strict=False))
-    lines = dict(zip(variants, cycle(_FRONTS), strict=False))
-    for variant in variants:
+    variants = dict.fromkeys(point.variant for point in points)
+    named: set[str] = set()
+    for variant, filling, line in zip(variants, cycle(_FILLS), cycle(_FRONTS), strict=False):
         own = [point for point in points if point.variant == variant]
+        style = {"fillstyle": filling, "markerfacecoloralt": "white"}
         costs = [(point.nanoseconds.median, point.error) for point in own]
-        corners = [costs[index] for index in front(costs, NOISE)]
-        style = {"color": "0.55", "linestyle": lines[variant], "linewidth": 1.2}
-        axes.step(*zip(*corners, strict=True), where="post", zorder=1, **style)
+        corners = zip(*(costs[index] for index in front(costs, NOISE)), strict=True)
+        axes.step(
+            *corners, where="post", marker="o", color="0.55", linestyle=line, label=variant, **style
+        )
         for point in own:
             median, low, high = point.nanoseconds
             axes.errorbar(
@@ -243,29 +244,23 @@ def _draw_panel(axes: Any, points: Iterable[_Point], colors: dict[str, str]) -> 
                 point.error,
                 xerr=[[median - low], [high - median]],
                 elinewidth=0.8,
-                fillstyle=fills[variant],
                 marker=shapes[point.name],
                 color=colors[point.name],
-                markerfacecoloralt="white",
                 linestyle="",
+                label=None if point.name in named else point.name,
+                **style,
             )
-    handles = [
-        axes.plot([], [], marker=shapes[name], color=colors[name], linestyle="", label=name)[0]
-        for name in colors
-    ] + [
-        axes.plot(
-            [], [], marker="o", color="0.4", fillstyle=fills[name], markerfacecoloralt="white",
-            linestyle=lines[name], label=name,
-        )[0]
-        for name in variants
-    ]  # fmt: skip
+            named.add(point.name)
     axes.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=8,
-        title="lines: what nothing is both quicker and nearer than", title_fontsize=8,
-    )  # fmt: skip
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.13),
+        ncols=3,
+        fontsize=8,
+        title="lines: what nothing is both quicker and nearer than",
+        title_fontsize=8,
+    )
     # Linear below the smallest error, so that an error of 0 is shown.
-    errors = [point.error for point in points if point.error > _ROUNDING]
-    smallest = min(errors, default=1.0)
+    smallest = min((point.error for point in points if point.error > _ROUNDING), default=1.0)
     axes.set_yscale("symlog", linthresh=smallest)
     axes.set_ylim(bottom=-0.2 * smallest)
     axes.set_xscale("log")

@@ -14,7 +14,6 @@ from typing import TypeAlias
 import numpy as np
 
 from mdfconv.brdf import reflection
-from mdfconv.brdf import reflection as phong
 from mdfconv.brdf.fresnel import Fresnel, lossless
 from mdfconv.brdf.microfacet import (
     MASKINGS,
@@ -35,14 +34,7 @@ from mdfconv.registry import Registry
 def cosine_lobe(axis: Array, exponent: float, u1: Array, u2: Array) -> Array:
     """Draw directions around an axis with density (γ+1)/(2π) cos^γ (Lafortune & Willems 1994).
 
-    Parameters
-    ----------
-    axis : numpy.ndarray, shape (..., 3)
-        Unit vector; with the normal and γ = 1 the draw is cosine-weighted.
-    exponent : float
-        γ ≥ 0.
-    u1, u2 : numpy.ndarray
-        Uniform random numbers.
+    Around the normal and with γ = 1 the draw is cosine-weighted; u₁ and u₂ are uniform on [0, 1).
     """
     # 1 − cos θ = −expm1(ln(1−u)/(γ+1)) keeps the digits of narrow lobes.
     drop = -np.expm1(np.log1p(-u1) / (exponent + 1))
@@ -103,17 +95,9 @@ _AZIMUTHS_AT_ONCE = 32
 class FurnaceModel:
     """A BRDF with what the integration must know of it.
 
-    Parameters
-    ----------
-    brdf : callable
-        f(light, view), 1/sr, for unit vectors of shape (..., 3), which are broadcast.
-    width : float
-        About the angle, in radians, over which f falls from its peak.
-    around_mirror : bool
-        Whether the peak surrounds the mirror image of the viewer (Phong) or, in half vectors,
-        the normal (microfacets).
-    sample : callable
-        From (view, u₁, u₂) to light directions and their density, 1/sr.
+    `width` is about the angle, in radians, over which it falls from its peak, which surrounds the
+    mirror image of the viewer (Phong) or, in half vectors, the normal (microfacets). `sample`
+    takes (view, u₁, u₂) to light directions and their density, 1/sr.
     """
 
     brdf: Brdf
@@ -152,23 +136,9 @@ def directional_albedo(model: FurnaceModel, cosine: Array) -> Array:
 def sampled_albedo(
     model: FurnaceModel, cosine: Array, count: int, seed: int
 ) -> tuple[Array, Array]:
-    """Estimate the directional albedo by drawing light directions.
+    """Return means and standard errors of f cos θ_l / p over `count` ≥ 2 drawn directions.
 
-    Parameters
-    ----------
-    model : FurnaceModel
-        The BRDF.
-    cosine : numpy.ndarray, shape (n,)
-        Cosines of the viewer.
-    count : int
-        Directions for each, at least 2.
-    seed : int
-        Of the random numbers.
-
-    Returns
-    -------
-    albedo, standard_error : numpy.ndarray, shape (n,)
-        Means of f cos θ_l / p, and their standard errors.
+    There is one of each for every cosine of the viewer; `seed` is that of the random numbers.
     """
     random = np.random.default_rng(seed)
     results = [_estimate(model, float(value), random.random((2, count))) for value in cosine]
@@ -348,34 +318,18 @@ def list_models() -> list[str]:
     return _REGISTRY.names
 
 
-def _microfacets(name: str) -> Callable[..., FurnaceModel]:
-    def build(alpha: float, masking: str = "correlated") -> FurnaceModel:
-        surface = Microsurface(distribution(name), alpha)
-        shadow = MASKINGS[masking](surface)
-        return _facet_model(reflection.microfacet(surface, lossless, shadow), surface)
+def _of_facets(name: str, owner: str, brdf: Callable[..., Brdf], option: str = "") -> _Definition:
+    """Return the definition of a BRDF of half vectors, by the distribution of its facets."""
 
-    return build
+    def build(parameter: float, **options: str) -> FurnaceModel:
+        surface = Microsurface(distribution(owner), parameter)
+        return _facet_model(brdf(surface, lossless, **options), surface)
 
-
-def _with_distribution(
-    name: str, mdf: str, brdf: Callable[[Microsurface, Fresnel], Brdf]
-) -> _Definition:
-    def build(parameter: float) -> FurnaceModel:
-        surface = Microsurface(distribution(mdf), parameter)
-        return _facet_model(brdf(surface, lossless), surface)
-
-    return _Definition(name, build, distribution=mdf)
+    return _Definition(name, build, option, owner)
 
 
-def _register(definition: _Definition) -> None:
-    """Register a BRDF, under all names of its distribution if it has that of one."""
-    name, owner = definition.name, definition.distribution
-    if owner == name:
-        mdf = distribution(name)
-        _REGISTRY.add(name, definition, mdf.aliases, mdf.meant_by)
-    else:
-        phong = distribution("blinn-phong").meant_by if not owner else {}
-        _REGISTRY.add(name, definition, meant_by=dict.fromkeys(phong, "phong"))
+def _masked(surface: Microsurface, fresnel: Fresnel, masking: str = "correlated") -> Brdf:
+    return reflection.microfacet(surface, fresnel, MASKINGS[masking](surface))
 
 
 def _facet_model(brdf: Brdf, surface: Microsurface) -> FurnaceModel:
@@ -396,11 +350,11 @@ def _facet_model(brdf: Brdf, surface: Microsurface) -> FurnaceModel:
 
 
 def _original_phong(exponent: float) -> FurnaceModel:
-    return _mirror_model(phong.original(exponent), exponent)
+    return _mirror_model(reflection.original(exponent), exponent)
 
 
 def _modified_phong(exponent: float, normalizer: str = "usual") -> FurnaceModel:
-    return _mirror_model(phong.modified(exponent, normalizer), exponent)
+    return _mirror_model(reflection.modified(exponent, normalizer), exponent)
 
 
 def _mirror_model(brdf: Brdf, exponent: float) -> FurnaceModel:
@@ -414,13 +368,24 @@ def _mirror_model(brdf: Brdf, exponent: float) -> FurnaceModel:
     return FurnaceModel(brdf, 1 / np.sqrt(exponent + 1), True, sample)
 
 
+def _register(definition: _Definition) -> None:
+    """Register a BRDF, under all names of its distribution if it has that of one."""
+    name, owner = definition.name, definition.distribution
+    if owner == name:
+        mdf = distribution(name)
+        _REGISTRY.add(name, definition, mdf.aliases, mdf.meant_by)
+    else:
+        meant = distribution("blinn-phong").meant_by if not owner else {}
+        _REGISTRY.add(name, definition, meant_by=dict.fromkeys(meant, "phong"))
+
+
 for _definition in (
-    _Definition("ggx", _microfacets("ggx"), "masking", "ggx"),
-    _Definition("beckmann", _microfacets("beckmann"), "masking", "beckmann"),
+    _of_facets("ggx", "ggx", _masked, "masking"),
+    _of_facets("beckmann", "beckmann", _masked, "masking"),
     _Definition("phong", _original_phong),
     _Definition("modified-phong", _modified_phong, "normalizer"),
-    _with_distribution("smoothie", "smoothie", reflection.smoothie),
-    _with_distribution("smoothie-approx", "smoothie", reflection.smoothie_approx),
-    _with_distribution("ashikhmin-shirley", "ashikhmin-shirley", reflection.ashikhmin_shirley),
+    _of_facets("smoothie", "smoothie", reflection.smoothie),
+    _of_facets("smoothie-approx", "smoothie", reflection.smoothie_approx),
+    _of_facets("ashikhmin-shirley", "ashikhmin-shirley", reflection.ashikhmin_shirley),
 ):
     _register(_definition)

@@ -17,7 +17,7 @@ from mdfconv.studies.bench import Sizes, Task, measure
 from mdfconv.studies.bench_page import draw, markdown_page, tables
 from mdfconv.studies.stability import audit
 
-TINY = Sizes(angles=512, conversions=64, fits=4, loop=2, rounds=1, patience=0.05)
+TINY = Sizes(angles=512, conversions=64, fits=4, loop=2, rounds=1)
 
 
 class Cosine(BlinnPhong):

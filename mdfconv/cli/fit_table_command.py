@@ -80,12 +80,12 @@ def command(
             "--compare and --closed-forms speak of the paper's rows: give one of them, without "
             "--sweep, --m-b or --extended"
         )
-    kept = chosen_metric(metric, exposure)
+    chosen = chosen_metric(metric, exposure)
     if closed_forms:
         refuse_given(context, ["metric"], "does not go with --closed-forms, which has every metric")
-    if compare and kept.name != "unit":
+    if compare and chosen.name != "unit":
         raise MdfconvError("--compare: the paper's table has the unit metric only")
-    outputs = Outputs(table=output, force=force, inputs=kept.inputs)
+    outputs = Outputs(table=output, force=force, inputs=chosen.inputs)
     rows: list[dict[str, Any]]
     if closed_forms:
         from mdfconv.studies.table2 import refit_rows
@@ -105,8 +105,8 @@ def command(
 
         values, limit = _sweep(sweep, m_b)
         with progress("Fitting", values.size) as advance:
-            rows = fit_table(values, limit, kept, extended=extended, progress=advance)
-        title = f"Fits of Beckmann, metric {kept}"
+            rows = fit_table(values, limit, chosen, extended=extended, progress=advance)
+        title = f"Fits of Beckmann, metric {chosen}"
         minor = [name for name in rows[0] if name.startswith("rmse")]
     write_table(list(rows[0]), rows, format_, outputs, title=title, secondary=minor)
 

@@ -87,26 +87,26 @@ def command(
 
     if not png and not svg:
         refuse_given(context, ["dpi", "log"], "is of pictures: give no --no-png, or --svg")
-    asked = asked_metric(metric, exposure)
-    chief = one_parameter_distribution(reference).name
-    chosen = [asked_endpoint(name) for name in mdf or ()]
-    names = [one.distribution.name for one in chosen]
-    sets = _parameter_sets(m_b, method, asked, chief, names)
+    chosen = asked_metric(metric, exposure)
+    reference = one_parameter_distribution(reference).name
+    endpoints = [asked_endpoint(name) for name in mdf or ()]
+    names = [one.distribution.name for one in endpoints]
+    sets = _parameter_sets(m_b, method, chosen, reference, names)
     forms = [*["png"] * png, *["svg"] * svg]
     folder = check_folder(context, output)
     endings = [*(f".{form}" for form in forms), *["b.csv"] * csv]
     outputs = Outputs(*(folder / f"{name}{end}" for name in sets for end in endings), force=force)
     contents, rows = {}, []
     for name, parameters in sets.items():
-        drawn = curves(parameters, given_metric(asked), points)
-        title = f"{chief} and its substitutes ({name})"
+        drawn = curves(parameters, given_metric(chosen), points)
+        title = f"{reference} and its substitutes ({name})"
         for form in forms:
             picture = draw_errors(drawn, title, form=form, dpi=dpi, log=log)
             contents[folder / f"{name}.{form}"] = picture
         if csv:
             contents[folder / f"{name}b.csv"] = file_bytes(drawn.error_text())
-        rows += [{"figure": name} | row for row in in_asked_forms(drawn.maxima(), chosen)]
-    title = f"Largest error against {chief}"
+        rows += [{"figure": name} | row for row in in_asked_forms(drawn.maxima(), endpoints)]
+    title = f"Largest error against {reference}"
     write_table(_COLUMNS, rows, format_, outputs, beside=contents, title=title)
 
 
@@ -114,7 +114,7 @@ def _parameter_sets(
     m_b: list[float] | None,
     method: str | None,
     metric: Metric | None,
-    chief: str,
+    reference: str,
     names: Sequence[str],
 ) -> dict[str, dict[str, float]]:
     """Return the parameters of each figure by its name, the reference's first."""
@@ -122,7 +122,7 @@ def _parameter_sets(
     from mdfconv.studies.error_curves import parameters_for
 
     if m_b:
-        shown = dict.fromkeys([chief, *(names or (_REFERENCE, *DRAWN))])
+        shown = dict.fromkeys([reference, *(names or (_REFERENCE, *DRAWN))])
         sets = {
             f"error-m_b-{value_name(value)}": parameters_for(value, list(shown), method, metric)
             for value in m_b
@@ -130,7 +130,7 @@ def _parameter_sets(
     elif method:
         raise MdfconvError("--method converts an --m-b: give one")
     else:
-        shown = dict.fromkeys([chief, *(names or PAPER_SETS["fig1"])])
+        shown = dict.fromkeys([reference, *(names or PAPER_SETS["fig1"])])
         for name in shown:
             if name not in PAPER_SETS["fig1"]:
                 raise MdfconvError(f"the paper's figures have no {name}: give --m-b")
@@ -139,5 +139,5 @@ def _parameter_sets(
             for figure, printed in PAPER_SETS.items()
         }
     if len(shown) == 1:
-        raise MdfconvError(f"{chief} is the reference: name another --mdf to compare with it")
+        raise MdfconvError(f"{reference} is the reference: name another --mdf to compare with it")
     return sets

@@ -166,7 +166,7 @@ def _fit_batch(task: FitTask, rows: Indices) -> Array:
         # The best lobes are about as wide as the source's.
         task, rows = task.part(rows), np.arange(rows.size)
         width = np.arctan(bounded_tangent(task.source, task.parameter))
-        task = task._replace(quadrature=SmoothQuadrature(width, steep=task.metric.steep))
+        task = task._replace(quadrature=SmoothQuadrature(width, root=task.metric.root))
     target, fit_range = task.target, task.target.parameters[1].fit_range
     low = np.array([-np.inf, np.log(fit_range[0])])
     high = np.log([target.parameter.upper, fit_range[1]])

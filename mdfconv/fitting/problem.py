@@ -76,7 +76,8 @@ class FitTask(NamedTuple):
         """Return all lobes as a batch whose minima are known to be near: a few angles do."""
         quadrature = self.quadrature
         if quadrature is None and self.metric.over_angles:
-            quadrature = SmoothQuadrature(narrowest(self.source, self.parameter, self.target, near))
+            width = narrowest(self.source, self.parameter, self.target, near)
+            quadrature = SmoothQuadrature(width, root=self.metric.root)
         return self._replace(quadrature=quadrature).problem(np.arange(self.parameter.size))
 
 

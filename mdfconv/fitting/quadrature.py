@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
-from mdfconv.distributions.evaluation import Array, Indices, gauss_panels
+from mdfconv.distributions.evaluation import Array, Indices, gauss_legendre, gauss_panels
 
 # Panels from a thousandth of the half width to the horizon, the widest factor between two of
 # them 2 for a mirror of 1e-8.
@@ -31,9 +31,6 @@ def _towards_edge(shrink: float, panels: int) -> Array:
 # Where a distribution leaves 0, an encoding for a screen bends: these panels resolve it to 1e-6 of
 # the lobe, with the nodes of a smooth quadrature the fewer ones do.
 _TO_EDGE, _TO_SMOOTH_EDGE = _towards_edge(4, 10), _towards_edge(16, 5)
-# A root of D has an infinite slope there. What the last panel, as narrow as rounding, leaves of a
-# cube root is 1e-10.
-_TO_STEEP_EDGE = _towards_edge(4, 27)
 
 
 # Angles and weights, shape (n, k).
@@ -75,12 +72,12 @@ class Quadrature(Protocol):
 class LobeQuadrature:
     """Gauss-Legendre panels that grow geometrically from the lobe to π/2.
 
-    `half_width`, shape (n,), is β_half of the narrowest lobe of each problem; `steep` whether the
-    integrand has an infinite slope where a distribution becomes 0.
+    `half_width`, shape (n,), is β_half of the narrowest lobe of each problem. Where a distribution
+    becomes 0, the integrand is a function of the `root` of the distance from there.
     """
 
-    def __init__(self, half_width: Array, *, steep: bool = False) -> None:
-        self._to_edge = _TO_STEEP_EDGE if steep else _TO_EDGE
+    def __init__(self, half_width: Array, *, root: float = 1.0) -> None:
+        self._root = root
         start = _NARROWEST * half_width[:, None]
         growth = np.linspace(0, 1, _LOBE_PANELS + 1)
         lobe = start * (0.5 * np.pi / start) ** growth
@@ -90,12 +87,12 @@ class LobeQuadrature:
 
     def nodes(self, rows: Indices, breaks: Breaks = NO_BREAKS) -> Samples:
         """Return angles and weights, as in the protocol."""
-        parts = [self._panels[rows]]
+        parts: list[Array] = [self._panels[rows]]
         if breaks.kinks is not None:
             parts.append(breaks.kinks)
         if breaks.edges is not None:
-            parts.append(_products(breaks.edges, self._to_edge))
-        return gauss_panels(_sorted_panels(*parts), _ORDER)
+            parts.append(_products(breaks.edges, _TO_EDGE))
+        return _panels_to_edges(_sorted_panels(*parts), breaks.edges, self._root)
 
     def coarse(self, rows: Indices, *, fine: bool = False) -> Samples:
         """Return the panels at a low order."""
@@ -113,22 +110,25 @@ class SmoothQuadrature:
     The arguments are those of `LobeQuadrature`.
     """
 
-    def __init__(self, half_width: Array, *, steep: bool = False) -> None:
+    def __init__(self, half_width: Array, *, root: float = 1.0) -> None:
         self._log_tangent = np.log(np.tan(half_width))[:, None]
-        self._steep = steep
+        self._root = root
 
     def nodes(self, rows: Indices, breaks: Breaks = NO_BREAKS) -> Samples:
         """Return angles and weights, as in the protocol."""
         middle = self._log_tangent[rows]
-        kinks, edges = breaks
-        if edges is not None and self._steep:
-            edges = _products(edges, _TO_STEEP_EDGE)
-        elif edges is not None and kinks is not None:
-            edges = _products(edges, _TO_SMOOTH_EDGE)
-        ends = [self._variable(part, middle) for part in (kinks, edges) if part is not None]
-        if ends:
-            panels = np.broadcast_to(_SMOOTH_PANELS, (rows.size, _SMOOTH_PANELS.size))
-            s, weight = gauss_panels(_sorted_panels(panels, *ends), _ORDER)
+        parts: list[Array] = [np.broadcast_to(_SMOOTH_PANELS, (rows.size, _SMOOTH_PANELS.size))]
+        edges = None
+        if breaks.kinks is not None:
+            parts.append(self._variable(breaks.kinks, middle))
+        if breaks.edges is not None:
+            edges = self._variable(breaks.edges, middle)
+            smooth = breaks.kinks is None and self._root == 1
+            shares = _TO_SMOOTH_EDGE if self._root == 1 else _TO_EDGE
+            graded = breaks.edges if smooth else _products(breaks.edges, shares)
+            parts.append(self._variable(graded, middle))
+        if len(parts) > 1:
+            s, weight = _panels_to_edges(_sorted_panels(*parts), edges, self._root)
         else:
             s = np.linspace(*_RANGE, _SMOOTH_NODES)[None, :]
             weight = np.broadcast_to(s[0, 1] - s[0, 0], s.shape)
@@ -149,6 +149,25 @@ class SmoothQuadrature:
 def _sorted_panels(*ends: Array) -> Array:
     """Return where the panels of each row begin and end, from their ends in any order."""
     return np.sort(np.concatenate(ends, axis=1), axis=1)
+
+
+def _panels_to_edges(ends: Array, edges: Array | None, root: float) -> Samples:
+    """Return nodes and weights on panels, of which some end at an edge.
+
+    There the node at the distance v^root, of a panel's width, takes the place of that at v: what
+    is a root of the distance is smooth in v.
+    """
+    nodes, weight = gauss_panels(ends, _ORDER)
+    if edges is None or root == 1:
+        return nodes, weight
+    at_edge = (ends[:, 1:, None] == edges[:, None, :]).any(axis=2)
+    width = np.diff(ends)[at_edge][:, None]
+    x, w = gauss_legendre(_ORDER)
+    v = 0.5 * (1 - x)
+    by_panel = (*at_edge.shape, _ORDER)
+    nodes.reshape(by_panel)[at_edge] = ends[:, 1:][at_edge][:, None] - width * v**root
+    weight.reshape(by_panel)[at_edge] = width * (0.5 * root * w * v ** (root - 1))
+    return nodes, weight
 
 
 def _products(angles: Array, shares: Array) -> Array:

@@ -377,6 +377,10 @@ def follow_stored(task: FitTask) -> Attempt:
 
 def _follow(task: FitTask, steps: Sequence[Metric], start: Array) -> Attempt:
     """Descend under one metric after the other; the last step is settled if it is a short one."""
+    if task.metric.root > 1 and task.target.edge(np.ones(1)) is not None:
+        # A root of a lobe has a slope at its edge whose square has no integral: as the edge moves
+        # with the parameter, Gauss-Newton steps tend to 0 anywhere.
+        return Attempt.nothing(start.size)
     accepts = task.target.parameter.accepts
     best, distance, before = np.full((3, task.parameter.size), np.nan)
     for rows in _batches(np.flatnonzero(accepts(start)), _WARM_ROWS):

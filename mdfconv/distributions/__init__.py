@@ -1,6 +1,6 @@
 """The registry of distributions.
 
-A new distribution is a module that defines ``DISTRIBUTION``, and one line in `_MODULES`.
+A new distribution is a module that defines ``DISTRIBUTIONS``, and one line in `_MODULES`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ _MODULES = (
     "ggx",
     "gtr",
     "blinn_phong",
-    "ashikhmin_shirley",
     "schlick",
     "sawicki",
     "smoothie",
@@ -37,8 +36,8 @@ _REGISTRY: Registry[Distribution] = Registry("distribution")
 
 
 for _module in _MODULES:
-    _mdf = import_module(f"{__name__}.{_module}").DISTRIBUTION
-    _REGISTRY.add(_mdf.name, _mdf, _mdf.aliases, _mdf.meant_by)
+    for _mdf in import_module(f"{__name__}.{_module}").DISTRIBUTIONS:
+        _REGISTRY.add(_mdf.name, _mdf, _mdf.aliases, _mdf.meant_by)
 
 
 def register(mdf: Distribution) -> None:

@@ -91,6 +91,14 @@ def same(parameter: Any, *gamma: Any) -> Any:
     return parameter
 
 
+def gamma_parameter(
+    typical: tuple[float, float], limits: tuple[float, float], fitted: tuple[float, float]
+) -> Parameter:
+    """Return a γ that is 2 where none is given, its typical, legal and fitted ranges."""
+    closed = {"lower_closed": True, "upper_closed": True}
+    return Parameter("gamma", "γ", typical, *limits, default=2.0, fit_range=fitted, **closed)
+
+
 ALPHA_MAP = MapVariables(
     width=same,
     from_width=same,
@@ -103,19 +111,11 @@ BOUNDED_ALPHA_MAP = replace(
 )
 
 
-class EvaluationOptions(TypedDict, total=False):
-    """The options of `Distribution.unit` and its like."""
+class Options(TypedDict, total=False):
+    """The options of `Distribution.unit` and `Distribution.normalized`."""
 
     phi: ArrayLike | None
     gamma: ArrayLike | None
-    threads: int
-
-
-class CumulativeOptions(TypedDict, total=False):
-    """The options of `Distribution.cumulative`."""
-
-    gamma: ArrayLike | None
-    complement: bool
     threads: int
 
 
@@ -241,24 +241,21 @@ class Distribution(ABC):
 
     def check_declarations(self) -> None:
         """Raise `MdfconvError` if a few values of the lobes contradict what is declared of them."""
-        low, high = self.parameter.typical
-        if self.scales_with_slope:
-            slope = np.array([0.3, 1.0, 3.0])
-            at_low, at_high = (self.cumulative(np.arctan(slope * p), p) for p in (low, high))
-            if not np.allclose(at_low, at_high, rtol=_DECLARED):
-                symbol = self.parameter.symbol
-                raise MdfconvError(
-                    f"{self.label} declares scales_with_slope, but where tan β = {symbol} its "
-                    f"F is {at_low[1]:.6g} at {symbol} = {low:g} and {at_high[1]:.6g} at {high:g}",
-                    "leave it False",
-                )
-        beta = np.linspace(0, 0.5 * np.pi, _CHECKED_ANGLES)
-        for end in (low, high):
-            value = self.unit(beta, end)
+        low, high, symbol = *self.parameter.typical, self.parameter.symbol
+        slope, beta = np.array([0.3, 1, 3]), np.linspace(0, 0.5 * np.pi, _CHECKED_ANGLES)
+        shares = [self.cumulative(np.arctan(slope * p), p) for p in (low, high)]
+        if self.scales_with_slope and not np.allclose(shares[0], shares[1], rtol=_DECLARED):
+            raise MdfconvError(
+                f"{self.label} declares scales_with_slope, but where tan β = {symbol} its F is "
+                f"{shares[0][1]:.6g} at {symbol} = {low:g} and {shares[1][1]:.6g} at {high:g}",
+                "leave it False",
+            )
+        for p in (low, high):
+            value = self.unit(beta, p)
             if not value.max() <= 1 + _DECLARED:
                 raise MdfconvError(
                     f"the unit form of {self.label} is {value.max():.6g} at β = "
-                    f"{beta[value.argmax()]:.3g} for {self.parameter.symbol} = {end:g}",
+                    f"{beta[value.argmax()]:.3g} for {symbol} = {p:g}",
                     "it is D over its maximum, which _off_axis_maximum gives where it is not D(0)",
                 )
 
@@ -269,9 +266,7 @@ class Distribution(ABC):
     @overload
     def unit(self, beta: float, parameter: float, *, gamma: float | None = ...) -> float: ...
     @overload
-    def unit(
-        self, beta: ArrayLike, parameter: Any, **options: Unpack[EvaluationOptions]
-    ) -> Array: ...
+    def unit(self, beta: ArrayLike, parameter: Any, **options: Unpack[Options]) -> Array: ...
 
     def unit(
         self,
@@ -315,9 +310,7 @@ class Distribution(ABC):
     @overload
     def normalized(self, beta: float, parameter: float, *, gamma: float | None = ...) -> float: ...
     @overload
-    def normalized(
-        self, beta: ArrayLike, parameter: Any, **options: Unpack[EvaluationOptions]
-    ) -> Array: ...
+    def normalized(self, beta: ArrayLike, parameter: Any, **options: Unpack[Options]) -> Array: ...
 
     def normalized(
         self,
@@ -338,7 +331,13 @@ class Distribution(ABC):
     def cumulative(self, beta: float, parameter: float, *, complement: bool = ...) -> float: ...
     @overload
     def cumulative(
-        self, beta: ArrayLike, parameter: ArrayLike, **options: Unpack[CumulativeOptions]
+        self,
+        beta: ArrayLike,
+        parameter: ArrayLike,
+        *,
+        gamma: ArrayLike | None = ...,
+        complement: bool = ...,
+        threads: int = ...,
     ) -> Array: ...
 
     def cumulative(

@@ -150,4 +150,4 @@ def _times_secant_power(square: Array, exponent: Array) -> Array:
     return square
 
 
-DISTRIBUTION = Beckmann()
+DISTRIBUTIONS = (Beckmann(),)

@@ -184,4 +184,4 @@ def _mean_square(parameter: Array) -> Array:
     return np.sum(mass * np.square(beta), axis=-1) / np.sum(mass, axis=-1)
 
 
-DISTRIBUTION = Gauss()
+DISTRIBUTIONS = (Gauss(),)

@@ -10,6 +10,8 @@ from mdfconv.distributions.base import (
     BOUNDED_ALPHA_MAP,
     AlphaDistribution,
     AnisotropicDistribution,
+    Distribution,
+    Equivalent,
     Printed,
 )
 from mdfconv.distributions.beckmann import slope_scale
@@ -82,10 +84,7 @@ class GGX(AlphaDistribution, AnisotropicDistribution):
         return np.square(square, out=square), ratio
 
     def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        ratio = tangent_square(beta) * inverse_square(parameter)
-        # Finite, so that the share of the lobe is 1 where it overflows.
-        ratio = np.minimum(ratio, np.finfo(ratio.dtype).max)
-        return ratio / (1 + ratio), 1 / (1 + ratio)
+        return trowbridge_reitz_shares(beta, inverse_square(parameter))
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         # Walter et al. 2007, eq. (35).
@@ -121,4 +120,18 @@ def trowbridge_reitz(beta: Array, scale: Array, out: Array | None) -> Array:
     return np.square(value, out=value)
 
 
-DISTRIBUTION = GGX()
+def trowbridge_reitz_shares(beta: Array, scale: Array) -> tuple[Array, Array]:
+    """Return F = k t² / (1+k t²) and 1 − F for k = `scale` = 1/α²."""
+    ratio = tangent_square(beta) * scale
+    # Finite, so that the share of the lobe is 1 where it overflows.
+    ratio = np.minimum(ratio, np.finfo(ratio.dtype).max)
+    return ratio / (1 + ratio), 1 / (1 + ratio)
+
+
+def ggx_at_two(mdf: Distribution) -> Equivalent | None:
+    """Return GGX as the equivalent of a distribution that it is at γ = 2."""
+    text = f"{mdf.name} with γ = 2 is ggx"
+    return Equivalent("ggx", forward_text=text, backward_text=text) if mdf.gamma == 2 else None
+
+
+DISTRIBUTIONS = (GGX(),)

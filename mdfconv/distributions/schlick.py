@@ -227,4 +227,4 @@ def _divide(a: DoubleDouble, divisor: float) -> DoubleDouble:
     return _sum(quotient, ((a[0] - high) - low + a[1]) / divisor)
 
 
-DISTRIBUTION = Schlick()
+DISTRIBUTIONS = (Schlick(),)

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import AlphaDistribution, Equivalent, Printed
+from mdfconv.distributions.base import AlphaDistribution, Equivalent, Printed, gamma_parameter
 from mdfconv.distributions.evaluation import (
     Array,
     inverse_square,
     negative_log_tail,
     tangent_square,
 )
+from mdfconv.distributions.ggx import ggx_at_two
 from mdfconv.distributions.parameter import Parameter
 
 # tan²β of an angle that no double tells from π/2.
@@ -50,17 +51,7 @@ class StudentT(AlphaDistribution):
     parameters = (
         Parameter("alpha", "α", (0.01, 0.8)),
         # Towards γ → ∞ it becomes Beckmann: the tails no longer tell γ, and 1/γ loses its digits.
-        Parameter(
-            "gamma",
-            "γ",
-            (2.0, 10.0),
-            2.0,
-            1e6,
-            lower_closed=True,
-            upper_closed=True,
-            default=2.0,
-            fit_range=(2.0, 512.0),
-        ),
+        gamma_parameter(typical=(2.0, 10.0), limits=(2.0, 1e6), fitted=(2.0, 512.0)),
     )
     operations = 26
     scales_with_slope = True
@@ -74,9 +65,7 @@ class StudentT(AlphaDistribution):
     @property
     def equivalent(self) -> Equivalent | None:
         """GGX at γ = 2."""
-        same = "student-t with γ = 2 is ggx"
-        is_ggx = self.gamma == 2
-        return Equivalent("ggx", forward_text=same, backward_text=same) if is_ggx else None
+        return ggx_at_two(self)
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         # [(1+t²)/(1+x) · (1+x)^(1−½γ)]²: an exponential multiplies the rounding of its exponent, so
@@ -145,4 +134,4 @@ class StudentT(AlphaDistribution):
         return tangent / np.sqrt((self.gamma - 1) * x)
 
 
-DISTRIBUTION = StudentT()
+DISTRIBUTIONS = (StudentT(),)

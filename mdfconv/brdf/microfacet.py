@@ -75,15 +75,8 @@ def azimuth(vectors: Array) -> Array:
 def frames(normals: Array) -> Array:
     """Return right-handed orthonormal frames whose z axes are normals (Duff et al. 2017).
 
-    Parameters
-    ----------
-    normals : numpy.ndarray, shape (..., 3)
-        Unit vectors.
-
-    Returns
-    -------
-    numpy.ndarray, shape (..., 3, 3)
-        The axes as rows: a matrix times a direction is that direction in the frame.
+    The axes are the rows, shape (..., 3, 3): a matrix times a direction is that direction in the
+    frame.
     """
     x, y, z = np.moveaxis(normals, -1, 0)
     sign = np.where(z < 0, -1.0, 1.0)

@@ -27,14 +27,8 @@ _LARGEST_RECURRENCE = 1e5
 def around_mirror(lobe: Callable[[Array], Array], factor: Callable[[Array], Array | float]) -> Brdf:
     """Return the BRDF lobe(θ_r) factor(n·v) for θ_r < π/2.
 
-    A lobe with long tails ends with an edge.
-
-    Parameters
-    ----------
-    lobe : callable
-        Of angles θ_r, radians.
-    factor : callable
-        Of cosines n·v: the Fresnel term, or what normalizes the lobe.
+    A lobe with long tails ends with an edge. The factor is the Fresnel term, or what normalizes
+    the lobe.
     """
 
     def brdf(light: Array, view: Array) -> Array:

@@ -153,14 +153,7 @@ def _sine_integral(parameter: Array) -> Array:
 def _slab_integral(start: Array, length: Array, to_horizon: Array, m: Array) -> Array:
     """Return ∫ e^(−b²/m²) sin 2b db from an angle on, over a length.
 
-    Parameters
-    ----------
-    start, length : numpy.ndarray
-        Where the integral begins and how far it reaches, radians.
-    to_horizon : numpy.ndarray
-        π/2 − start, which near the horizon keeps the digits of sin 2b.
-    m : numpy.ndarray
-        The width, of the same shape.
+    `to_horizon` is π/2 − start, which near the horizon keeps the digits of sin 2b.
     """
     x, weight = gauss_legendre(_CUMULATIVE_NODES)
     # Over u = b²: b² − start² = (b − start)(b + start).

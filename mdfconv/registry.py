@@ -17,12 +17,8 @@ _SEPARATORS = str.maketrans("_/ ", "---")
 class Registry(Generic[Item]):
     """Items by name and alias, in the order in which they were added.
 
-    Case does not matter in a name, and ``_``, ``/`` and blanks count as ``-``.
-
-    Parameters
-    ----------
-    kind : str
-        What the items are, for messages, such as ``"distribution"``.
+    Case does not matter in a name, and ``_``, ``/`` and blanks count as ``-``. The kind says in
+    messages what the items are.
     """
 
     def __init__(self, kind: str) -> None:
@@ -38,25 +34,11 @@ class Registry(Generic[Item]):
         aliases: Sequence[str] = (),
         meant_by: Mapping[str, str] | None = None,
     ) -> None:
-        """Add an item.
+        """Add an item; `meant_by` leads from words that are no names to what they may mean.
 
-        Parameters
-        ----------
-        name : str
-            Its name.
-        item : object
-            The item.
-        aliases : sequence of str
-            Other names of it.
-        meant_by : mapping of str to str
-            From words that are no names to what who writes them may mean: a hint.
-
-        Raises
-        ------
-        MdfconvError
-            If the name or an alias is taken, or is not one as they are looked up: in small
-            letters, with ``-`` between words, without the colon that sets off an encoding or a
-            setting.
+        Raise `MdfconvError` if the name or an alias is taken, or is not one as they are looked up:
+        in small letters, with ``-`` between words, without the colon that sets off an encoding or
+        a setting.
         """
         if isinstance(aliases, str):
             raise MdfconvError(f"the aliases of {name} are a sequence, not the string {aliases!r}")
@@ -97,19 +79,7 @@ def _key(name: str) -> str:
 def unknown_name(
     kind: str, name: str, known: Sequence[str], meant: Sequence[str] = ()
 ) -> MdfconvError:
-    """Return the error for a name that is not known, with the nearest ones that are.
-
-    Parameters
-    ----------
-    kind : str
-        What the name was meant to name, such as ``"distribution"``.
-    name : str
-        The name as the user wrote it.
-    known : sequence of str
-        Every name that would have been accepted.
-    meant : sequence of str
-        What the name is known to be taken for, if it is.
-    """
+    """Return the error for a name that is not known, with what it means or the nearest ones."""
     from difflib import get_close_matches
 
     near = meant or get_close_matches(name.lower(), known, n=3, cutoff=0.5)

@@ -36,7 +36,7 @@ def rows():
     cases = [
         (source, target, value)
         for source, target in PAIRS
-        for value in (EXPONENTS if source in oracles.EXPONENTS else ALPHAS)
+        for value in (EXPONENTS if oracles.is_exponent(source) else ALPHAS)
     ]
     with ProcessPoolExecutor() as pool:
         yield from pool.map(row, *zip(*cases, strict=True))
@@ -59,7 +59,7 @@ def best(metric, source, target, value):
     width = float(oracles.half_width(source, value))
     guess = float(oracles.from_half_width(target, mp.mpf(width)))
     candidates = guess * np.geomspace(0.2, 5, 30)
-    if target in oracles.EXPONENTS:
+    if oracles.is_exponent(target):
         candidates = guess * np.geomspace(5, 0.04, 30)
     start = mp.mpf(brute_force.minimum(metric, source, value, target, width, candidates))
     imbalance = functools.partial(_imbalance, metric, source, value, target)

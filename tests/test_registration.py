@@ -196,4 +196,4 @@ def test_a_missing_oracle_is_noticed(folder, tests):
         assert done.returncode == 0, done.stdout
     else:
         assert done.returncode == 1, done.stdout
-        assert "KeyError: 'cubic-slope'" in done.stdout
+        assert "no oracle for cubic-slope: add a case to `" in done.stdout

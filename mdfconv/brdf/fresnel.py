@@ -174,15 +174,7 @@ PLASTICS: Mapping[str, float] = {
 
 @dataclass(frozen=True)
 class Material:
-    """A material, as far as its reflectance goes.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    fresnel : callable
-        Reflectance of cosines; of a coloured one in linear Rec. 709 R, G, B.
-    """
+    """A material, as far as its reflectance goes: of a coloured one in linear Rec. 709 R, G, B."""
 
     name: str
     fresnel: Fresnel

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
-from scipy.special import betainc, poch
 
 from mdfconv.brdf.fresnel import Fresnel
 from mdfconv.brdf.microfacet import Brdf, Masking, Microsurface, above, mirrored, v_cavity
@@ -28,14 +27,8 @@ _LARGEST_RECURRENCE = 1e5
 def around_mirror(lobe: Callable[[Array], Array], factor: Callable[[Array], Array | float]) -> Brdf:
     """Return the BRDF lobe(θ_r) factor(n·v) for θ_r < π/2.
 
-    A lobe with long tails ends with an edge.
-
-    Parameters
-    ----------
-    lobe : callable
-        Of angles θ_r, radians.
-    factor : callable
-        Of cosines n·v: the Fresnel term, or what normalizes the lobe.
+    A lobe with long tails ends with an edge. The factor is the Fresnel term, or what normalizes
+    the lobe.
     """
 
     def brdf(light: Array, view: Array) -> Array:
@@ -91,6 +84,27 @@ def check_exponent(exponent: float) -> None:
         raise MdfconvError(f"Phong's exponent is at least 0, not {exponent:g}")
 
 
+def normalization(normalizer: str, cosine: Array, exponent: float) -> Array:
+    """Return I_M = ∫ cos^γ θ_r cos θ_i dω_i, exactly or as an approximation.
+
+    Parameters
+    ----------
+    normalizer : str
+        ``"usual"``, ``"arvo"`` or ``"mallett-yuksel"``.
+    cosine : numpy.ndarray
+        Cosine of the viewer with the normal, [0, 1].
+    exponent : float
+        γ ≥ 0; an integer up to 10⁵ for ``"arvo"``.
+
+    Raises
+    ------
+    MdfconvError
+        If the name is not known, or the exponent not one that the normalizer takes.
+    """
+    check_exponent(exponent)
+    return NORMALIZERS[normalizer](np.asarray(cosine, float), float(exponent))
+
+
 def usual(cosine: Array, exponent: float) -> Array:
     """Return 2π/(γ+2), which is I_M for a viewer along the normal and too large elsewhere."""
     return np.full_like(cosine, 2 * np.pi / (exponent + 2))
@@ -124,6 +138,8 @@ def mallett_yuksel(cosine: Array, exponent: float) -> Array:
     2πc + √π R (s^γ − c (γ/2) B(s²; γ/2, ½)) becomes πc (1 + I(c²; ½, γ/2)) + √π R s^γ: a sum
     of positive terms, which keeps its digits from γ = 0 to 10⁶ and from normal to grazing.
     """
+    from scipy.special import betainc, poch
+
     half = 0.5 * exponent
     ratio = 1 / poch(half + 0.5, 0.5)
     with np.errstate(divide="ignore", invalid="ignore"):

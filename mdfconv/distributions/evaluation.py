@@ -37,15 +37,8 @@ _WORTH_THREADS, _PARTS_A_THREAD = 1 << 20, 4
 def as_operand(values: ArrayLike) -> Any:
     """Return real numbers in a form that takes part in NumPy's type promotion.
 
-    Parameters
-    ----------
-    values : array_like
-        Real numbers. Python numbers stay as they are, so that they do not widen float32.
-
-    Raises
-    ------
-    MdfconvError
-        If the values are not real numbers.
+    Python numbers stay as they are, so that they do not widen float32. Raise `MdfconvError` if the
+    values are not real numbers.
     """
     if isinstance(values, np.ma.MaskedArray):
         raise MdfconvError("a masked array: fill or compress it first")
@@ -162,22 +155,7 @@ def worth_threads(size: int, threads: int) -> bool:
 
 
 def in_parts(run: Callable[[int, int], None], size: int, threads: int) -> None:
-    """Run over a range, a large one in parts by several threads.
-
-    Parameters
-    ----------
-    run : callable
-        Does the part from one index to another.
-    size : int
-        The range is from 0 to here.
-    threads : int
-        How many run at a time, from 1.
-
-    Raises
-    ------
-    MdfconvError
-        If the number of threads makes no sense.
-    """
+    """Run from 0 to a size, a large range in parts by several threads."""
     if not worth_threads(size, threads):
         run(0, size)
         return
@@ -188,8 +166,7 @@ def in_parts(run: Callable[[int, int], None], size: int, threads: int) -> None:
 
 def inverse_square(values: Array) -> Array:
     """Return 1/values², finite even where values² underflows, so that 0 times it is 0."""
-    inverse: Array = np.minimum(1 / (values * values), np.finfo(values.dtype).max)
-    return inverse
+    return np.minimum(1 / (values * values), np.finfo(values.dtype).max)
 
 
 def tangent_square(beta: Array, out: Array | None = None) -> Array:
@@ -200,8 +177,7 @@ def tangent_square(beta: Array, out: Array | None = None) -> Array:
 
 def negative_log_tail(lobe: Array, tail: Array) -> Array:
     """Return −ln(1 − F) for F and 1 − F, from the one that has the digits."""
-    logarithm: Array = np.where(lobe < tail, -np.log1p(-lobe), -np.log(tail))
-    return logarithm
+    return np.where(lobe < tail, -np.log1p(-lobe), -np.log(tail))
 
 
 @cache
@@ -213,18 +189,9 @@ def gauss_legendre(order: int) -> tuple[Array, Array]:
 
 
 def gauss_panels(edges: Array, order: int) -> tuple[Array, Array]:
-    """Return Gauss-Legendre nodes and weights on the panels between sorted edges.
+    """Return Gauss-Legendre nodes and weights on the n panels between sorted edges.
 
-    Parameters
-    ----------
-    edges : numpy.ndarray, shape (..., n + 1)
-        Where the panels begin and end.
-    order : int
-        Nodes a panel.
-
-    Returns
-    -------
-    nodes, weights : numpy.ndarray, shape (..., n * order)
+    Of edges of the shape (..., n + 1) both have the shape (..., n * order).
     """
     x, w = gauss_legendre(order)
     half = 0.5 * np.diff(edges)[..., None]

@@ -6,9 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import Distribution, Equivalent, Printed
+from mdfconv.distributions.base import Distribution, Equivalent, Printed, gamma_parameter
 from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
-from mdfconv.distributions.ggx import printed_cosine, printed_from_cosine, trowbridge_reitz
+from mdfconv.distributions.ggx import (
+    ggx_at_two,
+    printed_cosine,
+    printed_from_cosine,
+    trowbridge_reitz,
+)
 from mdfconv.distributions.parameter import Parameter
 
 
@@ -42,17 +47,7 @@ class GTR(Distribution):
         Parameter("alpha", "C_TR", (0.01, 0.8), upper=1.0, upper_closed=True),
         # Towards γ → ∞ it becomes a Gaussian in sin β: α and γ can no longer be told apart.
         # Towards 0 it becomes uniform. Beyond either end 1 − γ and the constants lose their digits.
-        Parameter(
-            "gamma",
-            "γ",
-            (1.5, 3.0),
-            1e-6,
-            1e6,
-            lower_closed=True,
-            upper_closed=True,
-            default=2.0,
-            fit_range=(0.25, 64.0),
-        ),
+        gamma_parameter(typical=(1.5, 3.0), limits=(1e-6, 1e6), fitted=(0.25, 64.0)),
     )
     operations = 24
     printed = Printed(
@@ -66,9 +61,7 @@ class GTR(Distribution):
     @property
     def equivalent(self) -> Equivalent | None:
         """GGX at γ = 2."""
-        same = "gtr with γ = 2 is ggx"
-        is_ggx = self.gamma == 2
-        return Equivalent("ggx", forward_text=same, backward_text=same) if is_ggx else None
+        return ggx_at_two(self)
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         scale = inverse_square(parameter)
@@ -172,4 +165,4 @@ def _ratio(numerator: Array, denominator: Array) -> Array:
     return np.where(at_limit, 1, numerator / np.where(at_limit, 1, denominator))
 
 
-DISTRIBUTION = GTR()
+DISTRIBUTIONS = (GTR(),)

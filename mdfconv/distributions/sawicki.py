@@ -124,4 +124,4 @@ class Sawicki(Distribution):
         return 8 / (3 * np.square(alpha)) - 3
 
 
-DISTRIBUTION = Sawicki()
+DISTRIBUTIONS = (Sawicki(),)

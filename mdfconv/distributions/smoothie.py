@@ -7,8 +7,13 @@ from typing import Any
 import numpy as np
 
 from mdfconv.distributions.base import Distribution, Equivalent, MapVariables, Printed
-from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
-from mdfconv.distributions.ggx import printed_cosine, printed_from_cosine, trowbridge_reitz
+from mdfconv.distributions.evaluation import Array, inverse_square
+from mdfconv.distributions.ggx import (
+    printed_cosine,
+    printed_from_cosine,
+    trowbridge_reitz,
+    trowbridge_reitz_shares,
+)
 from mdfconv.distributions.parameter import Parameter
 
 _EXCESS = np.sqrt(2) - 1
@@ -84,10 +89,7 @@ class Smoothie(Distribution):
         return -8 / (4 + np.square(parameter))
 
     def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        ratio = tangent_square(beta) * (1 + 4 * inverse_square(parameter))
-        # Finite, so that the share of the lobe is 1 where it overflows.
-        ratio = np.minimum(ratio, np.finfo(ratio.dtype).max)
-        return ratio / (1 + ratio), 1 / (1 + ratio)
+        return trowbridge_reitz_shares(beta, 1 + 4 * inverse_square(parameter))
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         return np.arctan(to_ggx(parameter) * np.sqrt(lobe / tail))
@@ -106,4 +108,4 @@ class Smoothie(Distribution):
         return from_ggx(alpha)
 
 
-DISTRIBUTION = Smoothie()
+DISTRIBUTIONS = (Smoothie(),)

@@ -6,19 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import (
-    Distribution,
-    Equivalent,
-    Printed,
-    inverse_square_over_pi,
-    same,
-)
+from mdfconv.distributions.base import AlphaDistribution, Equivalent, Printed, gamma_parameter
 from mdfconv.distributions.evaluation import (
     Array,
     inverse_square,
     negative_log_tail,
     tangent_square,
 )
+from mdfconv.distributions.ggx import ggx_at_two
 from mdfconv.distributions.parameter import Parameter
 
 # tan²β of an angle that no double tells from π/2.
@@ -35,7 +30,7 @@ def _printed_unit(beta: Any, alpha: Any, gamma: Any) -> Any:
     return np.where(off_axis, value / maximum, value)
 
 
-class StudentT(Distribution):
+class StudentT(AlphaDistribution):
     """Slopes with the tails of a Student-t distribution: Ribardière et al. 2017.
 
     With t = tan β and x = t²/((γ−1) α²)::
@@ -56,36 +51,21 @@ class StudentT(Distribution):
     parameters = (
         Parameter("alpha", "α", (0.01, 0.8)),
         # Towards γ → ∞ it becomes Beckmann: the tails no longer tell γ, and 1/γ loses its digits.
-        Parameter(
-            "gamma",
-            "γ",
-            (2.0, 10.0),
-            2.0,
-            1e6,
-            lower_closed=True,
-            upper_closed=True,
-            default=2.0,
-            fit_range=(2.0, 512.0),
-        ),
+        gamma_parameter(typical=(2.0, 10.0), limits=(2.0, 1e6), fitted=(2.0, 512.0)),
     )
     operations = 26
     scales_with_slope = True
-    printed = Printed(
+    printed = Printed.of_alpha(
         _printed_unit,
-        inverse_square_over_pi,
         from_cosine=lambda c, gamma: (
             np.tan(np.arccos(c)) / np.sqrt((gamma - 1) * ((2 / c**4) ** (1 / gamma) - 1))
         ),
-        peak_alpha=same,
-        from_peak_alpha=same,
     )
 
     @property
     def equivalent(self) -> Equivalent | None:
         """GGX at γ = 2."""
-        same = "student-t with γ = 2 is ggx"
-        is_ggx = self.gamma == 2
-        return Equivalent("ggx", forward_text=same, backward_text=same) if is_ggx else None
+        return ggx_at_two(self)
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         # [(1+t²)/(1+x) · (1+x)^(1−½γ)]²: an exponential multiplies the rounding of its exponent, so
@@ -104,17 +84,11 @@ class StudentT(Distribution):
         value /= x
         return np.square(value, out=value)
 
-    def _at_normal(self, parameter: Array) -> Array:
-        return 1 / (np.pi * parameter * parameter)
-
     def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         square = tangent_square(beta)
         x = square * (inverse_square(parameter) / (self.gamma - 1))
         value = np.square((1 + square) * np.exp(-0.5 * self.gamma * np.log1p(x)))
         return value, 2 * self.gamma * x / (1 + x)
-
-    def _log_slope_at_normal(self, parameter: Array) -> Array:
-        return np.full_like(parameter, -2)
 
     def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         x = tangent_square(beta) * (inverse_square(parameter) / (self.gamma - 1))
@@ -159,11 +133,5 @@ class StudentT(Distribution):
         x = np.expm1((np.log(2) + 2 * np.log1p(square)) / self.gamma)
         return tangent / np.sqrt((self.gamma - 1) * x)
 
-    def _peak_alpha(self, parameter: Array) -> Array:
-        return parameter
 
-    def _from_peak_alpha(self, alpha: Array) -> Array:
-        return alpha
-
-
-DISTRIBUTION = StudentT()
+DISTRIBUTIONS = (StudentT(),)

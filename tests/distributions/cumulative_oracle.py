@@ -7,6 +7,8 @@ from functools import cache
 
 import mpmath as mp
 
+from tests.oracles import missing
+
 # Enough where a narrow lobe's tail is a difference of numbers that agree in hundreds of them.
 DIGITS = 420
 
@@ -95,4 +97,6 @@ def cumulative(name, beta, parameter, gamma=None):
     """Return F and 1 − F for numbers as floats hold them."""
     with mp.workdps(DIGITS):
         numbers = [mp.mpf(float(value)) for value in (beta, parameter, gamma or 2)]
+        if name not in FORMS:
+            raise missing(name, "FORMS", "tests/distributions/cumulative_oracle.py")
         return FORMS[name](*numbers)

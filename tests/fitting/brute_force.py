@@ -24,6 +24,13 @@ COARSE, FINE = 300, 600
 STEP = 1e-5
 # The sRGB curve has a corner at the end of its straight piece, and one where it is clipped.
 STRAIGHT, WHITE = 0.0031308, 1.0
+# What is compared of the light, of metrics that compare that.
+ENCODINGS = {
+    "energy": lambda light: light,
+    "display": lambda light: srgb(light),
+    "cube-root": np.cbrt,
+}
+METRICS = {"unit", "environment", *ENCODINGS}
 
 
 def schlick(c, m):
@@ -117,6 +124,11 @@ class Lobe:
 
 class Problem:
     def __init__(self, metric, source, parameter, target, width):
+        if metric not in METRICS:
+            raise LookupError(
+                f"no oracle for the metric {metric}: add it to ENCODINGS, or to `signal` and "
+                "`weight`, in tests/fitting/brute_force.py"
+            )
         self.metric, self.source, self.target = metric, Lobe(source, parameter), target
         self.width = 0.05 * width
         # Only Schlick's corner and the screen's make a grid depend on the target.
@@ -159,7 +171,7 @@ class Problem:
         if self.metric == "environment":
             return grid.share(form)
         light = form / (self.white * np.sum(grid.energy * form, axis=-1, keepdims=True))
-        return srgb(light) if self.metric == "display" else light
+        return ENCODINGS[self.metric](light)
 
     def weight(self, grid):
         return {"unit": grid.weight, "environment": grid.environment}.get(self.metric, grid.energy)

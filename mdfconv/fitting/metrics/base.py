@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import ClassVar, Self
 
@@ -17,11 +17,10 @@ from mdfconv.distributions.parameter import Parameter, number_text, percent_hint
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.quadrature import LobeQuadrature, Quadrature
 
-
-def scaled(parameter: Array, ratio: float, target: Distribution) -> Array:
-    """Return the fits of a pair that has a `Metric.ratio`, within the target's legal range."""
-    limited: Array = np.minimum(parameter * ratio, target.parameter.upper)
-    return limited
+# Between these a signal is the power of D/P that it is where D leaves 0.
+_SMALL_VALUES = 1e-30, 1e-20
+# What is so nearly of the first power is.
+_LEAST_ROOT = 1.03
 
 
 class Metric(ABC):
@@ -93,7 +92,17 @@ class Metric(ABC):
 
     def quadrature(self, half_width: Array) -> Quadrature:
         """Return where S is sampled, for lobes of which β_half is the narrowest, radians."""
-        return LobeQuadrature(half_width)
+        return LobeQuadrature(half_width, root=self.root)
+
+    @cached_property
+    def root(self) -> float:
+        """Which root of D the signal is where D leaves 0; 1 without an infinite slope there."""
+        with np.errstate(all="ignore"):
+            zero, near, farther = self.encode(np.array([0, *_SMALL_VALUES]))
+            root = math.log(_SMALL_VALUES[1] / _SMALL_VALUES[0]) / np.log(
+                (farther - zero) / (near - zero)
+            )
+        return float(root) if _LEAST_ROOT < root < np.inf else 1.0
 
     def ratio(self, source: Distribution, target: Distribution) -> float | None:
         """Return p_target/p_source of the fit where that is one constant, else None."""

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from mdfconv.brdf.microfacet import Microsurface, direction, dot, frames, reflect, unit
+from mdfconv.brdf import Microsurface
+from mdfconv.brdf.microfacet import direction, dot, frames, reflect, unit
 from mdfconv.distributions import distribution
 from mdfconv.errors import MdfconvError
 from mdfconv.studies.furnace import cosine_lobe, cosine_lobe_density, reflected_density

@@ -284,8 +284,10 @@ def test_slopes(entry, normalized):
                 )
                 exact -= (mp.log(above) - mp.log(below)) / (2 * step)
             exact += at_normal
-            assert slope[0, place] / value[0, place] == pytest.approx(
-                float(exact), rel=1e-9, abs=1e-9
+            got = slope[0, place] / value[0, place]
+            assert got == pytest.approx(float(exact), rel=1e-9, abs=1e-9), (
+                f"∂ ln D/∂ ln p of {name} at β = {angle} for {parameter} is not the printed "
+                "form's: see _lobe_and_log_slope, _log_slope_at_normal and _log_slope_off_axis"
             )
 
 

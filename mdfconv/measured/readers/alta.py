@@ -19,9 +19,9 @@ from mdfconv.measured.readers.base import (
     Reader,
     ReadOptions,
     Source,
-    decode,
     decode_head,
     from_half_and_difference,
+    known_by,
     samples_of_vectors,
 )
 from mdfconv.measured.readers.tables import parse_table
@@ -54,10 +54,6 @@ _TWO_DIRECTIONS: dict[str, tuple[int, Callable[..., tuple[Array, Array]]]] = {
     "RUSIN_TH_PH_TD_PD": (4, _half_and_difference),
     "CARTESIAN": (6, lambda *xyz: (np.stack(xyz[3:], -1), np.stack(xyz[:3], -1))),
 }
-
-
-def _recognizes(name: str, head: bytes) -> bool:
-    return bool(_DIMENSIONS.search(decode_head(head)))
 
 
 def _read(source: Source, options: ReadOptions) -> Measurements:
@@ -112,7 +108,7 @@ def _numbers(source: Source, tags: dict[str, str], inputs: int, outputs: int) ->
     """Return the rows of the file, the inputs first."""
     if tags.get("FORMAT", "text").lower() == "binary":
         return _binary(source, tags, inputs + outputs)
-    numbers = parse_table(source.path, decode(source).splitlines()).numbers
+    numbers = parse_table(source.path, source.lines()).numbers
     if not 1 <= outputs <= numbers.shape[1] - inputs:
         raise MdfconvError(
             f"{source.path}: {numbers.shape[1]} columns do not hold {inputs} + {outputs} dimensions"
@@ -139,4 +135,4 @@ def _binary(source: Source, tags: dict[str, str], width: int) -> Array:
     return np.frombuffer(content, f"{order}f8", size, start).astype(float).reshape(-1, width)
 
 
-READER = Reader("ALTA", _recognizes, _read)
+READER = Reader("ALTA", known_by(_DIMENSIONS), _read)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import mmap
+import re
 import struct
 import sys
 from collections.abc import Callable
@@ -84,6 +85,22 @@ class Source:
         """The first bytes, by which a reader knows its format."""
         return self.content[:_HEAD_BYTES]
 
+    def lines(self) -> list[str]:
+        """Return its lines: UTF-8, or what its byte order mark says; no control characters.
+
+        Raises `MdfconvError` if it is not text.
+        """
+        content = self.content[:]
+        encoding = _encoding(content)
+        try:
+            return content.decode(encoding).translate(_CONTROLS).splitlines()
+        except UnicodeDecodeError as error:
+            name = "UTF-16" if encoding == "utf-16" else "UTF-8"
+            raise MdfconvError(
+                f"{self.path}: not {name} text (byte {error.start + 1})",
+                "convert its encoding first",
+            ) from None
+
 
 @dataclass(frozen=True)
 class Reader:
@@ -127,20 +144,9 @@ def open_source(path: Path | str) -> Source:
             return Source(path, file.read())
 
 
-def decode(source: Source) -> str:
-    """Return the text of a source: UTF-8, or what its byte order mark says; no control characters.
-
-    Raises `MdfconvError` if it is not text.
-    """
-    content = source.content[:]
-    encoding = _encoding(content)
-    try:
-        return content.decode(encoding).translate(_CONTROLS)
-    except UnicodeDecodeError as error:
-        name = "UTF-16" if encoding == "utf-16" else "UTF-8"
-        raise MdfconvError(
-            f"{source.path}: not {name} text (byte {error.start + 1})", "convert its encoding first"
-        ) from None
+def known_by(line: re.Pattern[str]) -> Callable[[str, bytes], bool]:
+    """Return what recognizes a format by a line in its head."""
+    return lambda name, head: bool(line.search(decode_head(head)))
 
 
 def decode_head(head: bytes) -> str:

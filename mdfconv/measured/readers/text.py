@@ -10,7 +10,7 @@ import numpy as np
 
 from mdfconv.brdf.microfacet import mirrored, polar_angle
 from mdfconv.distributions.evaluation import Array
-from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode
+from mdfconv.measured.readers.base import Reader, ReadOptions, Source
 from mdfconv.measured.readers.tables import (
     Role,
     Table,
@@ -45,6 +45,7 @@ _INCIDENCE = re.compile(
     r"\s*(?:\(\w*\)|\[\w*\])?\s*[:=]\s*(?P<number>[-+]?\d+(?:\.\d*)?)\s*(?P<unit>deg|°|rad)?",
     re.I,
 )
+_INCIDENCE_UNITS = {"deg": "degrees", "°": "degrees", "rad": "radians"}
 # Files hold rounded angles.
 _SLACK = 1 + 1e-6
 # How much sooner, in standard deviations of the angle, values fall off with one half vector than
@@ -96,14 +97,14 @@ class _Columns:
                     f"name both; there are {', '.join(table.names)}",
                 )
             return None
-        channels, value_notes = self._value_columns(columns.values())
+        channels, values, value_notes = self._values(columns.values())
         unit = self._unit_of_directions(columns)
         columns = self._exchanged(columns, 90.0 if unit == "degrees" else np.pi / 2)
         to_radians = np.pi / 180 if unit == "degrees" else 1.0
         angles = {role: table.numbers[:, index] * to_radians for role, index in columns.items()}
         if incidence:
-            stored = self._unit_of_incidence(incidence) or unit
-            number = float(incidence["number"])
+            number, mark = float(incidence["number"]), incidence["unit"]
+            stored = _INCIDENCE_UNITS[mark.lower()] if mark else unit
             angle = np.radians(number) if stored == "degrees" else number
             angles[Role.theta_i] = np.full(len(table.numbers), angle)
             self._notes.append(
@@ -118,8 +119,8 @@ class _Columns:
                 angles[Role.phi_i],
                 angles[Role.theta_o],
                 angles[Role.phi_o],
-                table.numbers[:, channels],
-                tuple(table.names[index] for index in channels),
+                values,
+                channels,
                 (*self._notes, *value_notes),
             )
         )
@@ -128,10 +129,8 @@ class _Columns:
         """Return samples of one angle, or of two directions of which one is the normal."""
         table, meaning = self._table, self._options.angle_is
         column = self._angle_column()
-        channels, value_notes = self._value_columns([column])
-        angle, values = table.numbers[:, column], table.numbers[:, channels]
-        unit = self._unit_of_angle(column)
-        names = tuple(table.names[index] for index in channels)
+        channels, values, value_notes = self._values([column])
+        angle, unit = table.numbers[:, column], self._unit_of_angle(column)
         notes = (*self._notes, *value_notes)
         if meaning in (REFLECTED, INCIDENT):
             if unit == "cosine":
@@ -146,13 +145,13 @@ class _Columns:
             )
             first, second = (theta, zero) if meaning == INCIDENT else (zero, theta)
             return directional_samples(
-                table.path, first, zero, second, zero, values, names, (*notes, note)
+                table.path, first, zero, second, zero, values, channels, (*notes, note)
             )
         if not (table.is_named and is_half(table.names[column])):
             other = "" if meaning else ", not of a direction"
             read = f"{table.listed([column])} is read as the angle between normal and half vector"
             notes += (read + other,)
-        return samples(table.path, angle, unit, values, names, "ndf", notes)
+        return samples(table.path, angle, unit, values, channels, "ndf", notes)
 
     def _by_role(self) -> dict[Role, int]:
         """Return the columns of angles by what they hold."""
@@ -212,8 +211,13 @@ class _Columns:
         self._notes.append(f"{table.listed(rest[:1])} is taken for the angle")
         return rest[0]
 
+    def _values(self, angles: Collection[int]) -> tuple[tuple[str, ...], Array, list[str]]:
+        """Return the names and columns of values, and notes on what is passed over."""
+        columns, notes = self._value_columns(angles)
+        names = tuple(self._table.names[index] for index in columns)
+        return names, self._table.numbers[:, columns], notes
+
     def _value_columns(self, angles: Collection[int]) -> tuple[list[int], list[str]]:
-        """Return the columns of values beside those of angles, and notes on what is passed over."""
         table = self._table
         for index, name in self._names.items():
             different = np.unique(table.numbers[:, index]).size
@@ -321,11 +325,6 @@ class _Columns:
         matches = [m for comment in self._table.comments for m in _INCIDENCE.finditer(comment)]
         return matches[0] if len({float(match["number"]) for match in matches}) == 1 else None
 
-    @staticmethod
-    def _unit_of_incidence(incidence: re.Match[str]) -> str | None:
-        unit = incidence["unit"]
-        return unit and ("radians" if unit.lower() == "rad" else "degrees")
-
     def _complete_azimuths(self, angles: dict[Role, Array]) -> None:
         """Add the azimuths that the table does not have."""
         zero = np.zeros_like(angles[Role.theta_o])
@@ -386,7 +385,7 @@ def _fall(samples: DirectionalSamples) -> float:
 
 
 def _read(source: Source, options: ReadOptions) -> Measurements:
-    return read_table(parse_table(source.path, decode(source).splitlines()), options)
+    return read_table(parse_table(source.path, source.lines()), options)
 
 
 READER = Reader("text", lambda name, head: True, _read)

@@ -8,7 +8,7 @@ and the azimuth about it, 0 towards the normal of the surface and counter-clockw
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +17,7 @@ from mdfconv.brdf.microfacet import azimuth as azimuths
 from mdfconv.brdf.microfacet import direction, polar_angle
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.readers.base import (
-    Reader,
-    ReadOptions,
-    Source,
-    decode,
-    decode_head,
-    turn_from_normal,
-)
+from mdfconv.measured.readers.base import Reader, ReadOptions, Source, known_by, turn_from_normal
 from mdfconv.measured.samples import DirectionalSamples, directional_samples
 
 _KNOWN_BY = re.compile(r"^\s*AngleOfIncidence\s", re.M | re.I)
@@ -37,11 +30,11 @@ _CHANNELS = {"monochrome": "value", "tristimulusx": "X", "tristimulusy": "Y", "t
 class _Words:
     """A place in a text that moves on from word to word."""
 
-    def __init__(self, path: Path, text: str) -> None:
+    def __init__(self, path: Path, lines: Iterable[str]) -> None:
         self._path = path
         self._words = [
             (number, word)
-            for number, line in enumerate(text.splitlines(), start=1)
+            for number, line in enumerate(lines, start=1)
             if not line.lstrip().startswith("#")
             for word in line.split()
         ]
@@ -91,14 +84,10 @@ class _Words:
         return MdfconvError(f"{self._path}, line {number}: {reason}")
 
 
-def _recognizes(name: str, head: bytes) -> bool:
-    return bool(_KNOWN_BY.search(decode_head(head)))
-
-
 def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
     path = source.path
     options.refuse(path, "the header of Zemax's format says what its numbers are")
-    words = _Words(path, decode(source))
+    words = _Words(path, source.lines())
     axes = _header(path, words)
     channels, tables = [], []
     while (word := words.peek()) is not None and word.lower() in _CHANNELS:
@@ -164,4 +153,4 @@ def _samples(
     )
 
 
-READER = Reader("Zemax", _recognizes, _read)
+READER = Reader("Zemax", known_by(_KNOWN_BY), _read)

@@ -7,37 +7,29 @@ Cornell's Program of Computer Graphics) or degrees.
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
-from mdfconv.errors import MdfconvError
-from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, decode_head
+from mdfconv.measured.readers.base import Reader, ReadOptions, Source, known_by
 from mdfconv.measured.readers.tables import parse_table
 from mdfconv.measured.readers.text import read_table
-from mdfconv.measured.samples import DirectionalSamples, Samples
+from mdfconv.measured.samples import Measurements
 
 _VARIABLES = re.compile(r"^\s*VARS[ \t]*:?[ \t]+(?P<names>\S.*?)\s*$", re.M | re.I)
 _COUNT = re.compile(r"^\s*NUM_POINTS[ \t]*:?[ \t]+(?P<count>\S+)", re.M | re.I)
 
 
-def _recognizes(name: str, head: bytes) -> bool:
-    return bool(_VARIABLES.search(decode_head(head)))
-
-
-def _read(source: Source, options: ReadOptions) -> Samples | DirectionalSamples:
-    lines = decode(source).splitlines()
-    at = next(index for index, line in enumerate(lines) if _VARIABLES.match(line))
-    head, names = "\n".join(lines[:at]), _VARIABLES.match(lines[at])
+def _read(source: Source, options: ReadOptions) -> Measurements:
+    lines = source.lines()
+    at, names = next(
+        (index, match["names"])
+        for index, line in enumerate(lines)
+        if (match := _VARIABLES.match(line))
+    )
     # Blank lines keep the numbers of the lines for messages; the names become the header.
-    blank = [""] * at
-    table = parse_table(source.path, [*blank, names["names"] if names else "", *lines[at + 1 :]])
-    _check_count(source.path, head, len(table.numbers))
-    return read_table(source.path, table, options)
-
-
-def _check_count(path: Path, head: str, rows: int) -> None:
-    counted = _COUNT.search(head)
+    table = parse_table(source.path, [*[""] * at, names, *lines[at + 1 :]])
+    rows, counted = len(table.numbers), _COUNT.search("\n".join(lines[:at]))
     if counted and counted["count"] != str(rows):
-        raise MdfconvError(f"{path}: {rows} rows where NUM_POINTS says {counted['count'][:20]}")
+        raise table.error(f"{rows} rows where NUM_POINTS says {counted['count'][:20]}")
+    return read_table(table, options)
 
 
-READER = Reader("ASTM E1392", _recognizes, _read)
+READER = Reader("ASTM E1392", known_by(_VARIABLES), _read)

@@ -11,16 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, decode_head
+from mdfconv.measured.readers.base import Reader, ReadOptions, Source, known_by
 from mdfconv.measured.samples import DirectionalSamples, directional_samples
 
 _KNOWN_BY = re.compile(r"^\s*type\s+bsdf_data\b", re.M | re.I)
 _SETTING = re.compile(r"(\w+)\s*=\s*(\S+)")
 _COMMENTS = ("!", "#", "//")
-
-
-def _recognizes(name: str, head: bytes) -> bool:
-    return bool(_KNOWN_BY.search(decode_head(head)))
 
 
 def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
@@ -29,7 +25,7 @@ def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
     scale, to_radians = 1.0, np.pi / 180
     incidence: list[float] = []
     rows: list[list[float]] = []
-    for number, line in enumerate(decode(source).splitlines(), start=1):
+    for number, line in enumerate(source.lines(), start=1):
         words = line.split()
         if not words or line.lstrip().startswith(_COMMENTS) or words[0].lower() == "type":
             continue
@@ -76,4 +72,4 @@ def _numbers(path: Path, number: int, line: str) -> list[float]:
         raise MdfconvError(f"{path}, line {number}: not numbers: {line.strip()[:60]}") from None
 
 
-READER = Reader("FRED", _recognizes, _read)
+READER = Reader("FRED", known_by(_KNOWN_BY), _read)

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.gltf.asset import GltfConversion
     from mdfconv.scene.material_files import Destination
+    from mdfconv.scene.stored import MaterialProblem
 
 _HEADINGS = {
     "index": "#", "name": "material", "value": "was", "result": "is", "rmse": "RMSE",
@@ -181,8 +182,8 @@ def _convert(
         with about(destination.source):
             conversion = convert_gltf(data, *ends, metric=metric, textures=chosen)
         _tell_other_generator(destination.source, conversion.generator, ends[0])
-        problems = [(place, _with_option(text)) for place, text in conversion.problems]
-        return dataclasses.replace(conversion, problems=tuple(problems))
+        problems = tuple(map(_with_option, conversion.problems))
+        return dataclasses.replace(conversion, problems=problems)
 
     convert_files(
         context,
@@ -234,14 +235,16 @@ def _proposals(generator: str) -> dict[str, str]:
     return proposals
 
 
-def _with_option(problem: str) -> str:
+def _with_option(problem: MaterialProblem) -> MaterialProblem:
     """Return what is wrong with a material, with the option that helps."""
-    from mdfconv.scene.gltf.asset import HAS_TEXTURE
-    from mdfconv.scene.texture.images import ACCEPT_LOSSES
+    from mdfconv.scene.stored import ProblemKind
 
-    if problem == HAS_TEXTURE:
-        return f"{problem}: --textures converts it"
-    return f"{problem} (--lossy)" if problem.endswith(ACCEPT_LOSSES) else problem
+    options = {
+        ProblemKind.TEXTURE: ": --textures converts it",
+        ProblemKind.LOSSY: " (--lossy)",
+        ProblemKind.OTHER: "",
+    }
+    return problem._replace(text=problem.text + options[problem.kind])
 
 
 def _propose(files: list[str]) -> None:
@@ -282,7 +285,9 @@ def _report(
                 conversion.materials, exponents, metric, every=every, compare=compare
             ),
             "textures": [str(path) for path in conversion.files],
-            "problems": [{"place": place, "problem": text} for place, text in conversion.problems],
+            "problems": [
+                {"place": place, "problem": text} for place, text, _ in conversion.problems
+            ],
         }
         for (destination, conversion), exponents in zip(converted, known, strict=True)
     ]

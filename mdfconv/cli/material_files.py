@@ -128,7 +128,7 @@ def convert_files(
         else:
             tell(f"nothing to change in {destination.output}")
         _tell_notes(destination.source, conversion.notes)
-        for place, text in conversion.problems:
+        for place, text, _ in conversion.problems:
             tell(f"{destination.source}:{place}: {text}: left as it is")
             problems = True
     if problems:

@@ -140,7 +140,7 @@ def _record(
         "materials": materials,
         "textures": [vars(texture) for texture in conversion.textures],
         "includes": [{"line": line, "file": file} for line, file in conversion.includes],
-        "problems": [{"line": line, "problem": text} for line, text in conversion.problems],
+        "problems": [{"line": line, "problem": text} for line, text, _ in conversion.problems],
     }
 
 

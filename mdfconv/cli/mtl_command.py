@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from mdfconv.scene.material_files import Destination
     from mdfconv.scene.mtl.library import MtlConversion
     from mdfconv.scene.mtl.textures import MtlTextures
+    from mdfconv.scene.stored import MaterialProblem
 
 _HEADINGS = {
     "name": "material", "shininess": "Ns", "roughness": "Pr", "rmse": "RMSE", "notes": "notes",
@@ -133,11 +134,15 @@ def command(
     )
 
 
-def _with_option(problems: Sequence[tuple[int | str, str]]) -> tuple[tuple[int | str, str], ...]:
+def _with_option(problems: Sequence[MaterialProblem]) -> tuple[MaterialProblem, ...]:
     """Return what is left in a library, with the option that helps."""
+    from mdfconv.scene.stored import ProblemKind
+
     return tuple(
-        (line, f"{text}: --textures converts it" if text.startswith("map_Ns") else text)
-        for line, text in problems
+        problem._replace(text=f"{problem.text}: --textures converts it")
+        if problem.kind is ProblemKind.TEXTURE
+        else problem
+        for problem in problems
     )
 
 
@@ -172,7 +177,7 @@ def _report(
                 conversion.materials, exponents, metric, every=every, compare=compare
             ),
             "textures": [vars(texture) for texture in conversion.textures],
-            "problems": [{"line": line, "problem": text} for line, text in conversion.problems],
+            "problems": [{"line": line, "problem": text} for line, text, _ in conversion.problems],
             "notes": [{"line": line, "note": text} for line, text in conversion.notes],
         }
         for (destination, conversion), exponents in zip(converted, known, strict=True)

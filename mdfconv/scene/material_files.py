@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mdfconv.errors import MdfconvError
 from mdfconv.output.files import write_files
+from mdfconv.scene.stored import MaterialProblem
 
 
 @dataclass(frozen=True)
@@ -97,9 +98,8 @@ class FileConversion:
     ----------
     data : bytes
         Its bytes.
-    problems : tuple of (int or str, str)
-        What is left as it is: where it stands, a line or a path within the file, and what is
-        wrong with it.
+    problems : tuple of MaterialProblem
+        What is left as it is.
     notes : tuple of (int, str)
         What a careful user must know, and the line that it is about.
     files : mapping of Path to bytes
@@ -111,7 +111,7 @@ class FileConversion:
     """
 
     data: bytes
-    problems: tuple[tuple[int | str, str], ...] = ()
+    problems: tuple[MaterialProblem, ...] = ()
     notes: tuple[tuple[int, str], ...] = ()
     files: Mapping[Path, bytes] = field(default_factory=dict)
     inputs: Sequence[Path] = ()

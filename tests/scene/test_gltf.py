@@ -18,6 +18,7 @@ import mdfconv
 from mdfconv.errors import MdfconvError
 from mdfconv.scene import GltfTextures, convert_gltf
 from mdfconv.scene.gltf.asset import dialects_by_generator, generator_of
+from mdfconv.scene.stored import ProblemKind
 from tests.cli.runner import run, run_on_terminal
 
 pygltflib = pytest.importorskip("pygltflib")
@@ -192,7 +193,7 @@ def test_an_absent_factor_that_stays_1_is_not_written():
 def test_what_has_no_answer_is_left(source, value, problem):
     data = text_of(factor(value), factor(0.3))
     found = convert_gltf(data, source)
-    ((place, text),) = found.problems
+    ((place, text, _),) = found.problems
     assert place == "materials[0]"
     assert problem in text
     assert "\n" not in text
@@ -205,7 +206,7 @@ def test_what_has_no_answer_is_left(source, value, problem):
 def test_what_is_no_material_is_left(material):
     data = text_of(material, factor(0.9))
     found = convert_gltf(data, OBJ2GLTF)
-    assert [place for place, _ in found.problems] == ["materials[0]"]
+    assert [place for place, _, _ in found.problems] == ["materials[0]"]
     assert found.data == data.replace(b"0.9", b"0.33148781")
 
 
@@ -390,7 +391,7 @@ def content_of(image):
 def test_textures_need_to_be_asked_for():
     data = text_of(textured(0, 0.5), textures=[{"source": 0}], images=[{"uri": "a.png"}])
     found = convert_gltf(data, OBJ2GLTF)
-    assert found.problems == (("materials[0]", "has a roughness texture"),)
+    assert found.problems == (("materials[0]", "has a roughness texture", ProblemKind.TEXTURE),)
     assert found.data == data
 
 
@@ -548,7 +549,7 @@ def test_textures_that_are_left(image, texture, text, tmp_path):
         buffers=[{"byteLength": 3, "uri": "data:;base64,YWJj"}, {"byteLength": 3}],
     )
     found = convert_gltf(data, OBJ2GLTF, textures=GltfTextures(tmp_path, tmp_path))
-    ((place, problem),) = found.problems
+    ((place, problem, _),) = found.problems
     assert place == "materials[0]"
     assert text in problem
     assert (found.data, found.files, found.materials) == (data, {}, ())

@@ -15,18 +15,17 @@ from mdfconv.distributions.endpoint import Endpoint
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.gltf.container import read_container
-from mdfconv.scene.gltf.document import FACTOR, PBR, GltfDocument, read_document
-from mdfconv.scene.gltf.factors import convert_factors, factor_endpoints
+from mdfconv.scene.gltf.document import FACTOR, PBR, GltfDocument, material_problem, read_document
+from mdfconv.scene.gltf.factors import FactorTable, factor_endpoints
 from mdfconv.scene.gltf.images import GltfTextures
 from mdfconv.scene.gltf.textures import TextureChanges, convert_textures
 from mdfconv.scene.material_files import FileConversion
 from mdfconv.scene.shininess import ROUGHNESS
+from mdfconv.scene.stored import MaterialProblem, ProblemKind
 
 # Digits enough that an exponent comes back from a roughness to six.
 _DIGITS = 8
 _SAME = 0.5e-8
-# What is wrong with a material whose texture is not to be converted.
-HAS_TEXTURE = "has a roughness texture"
 
 
 @dataclass(frozen=True)
@@ -119,7 +118,12 @@ def convert_gltf(
     if textures:
         changes = convert_textures(document, container, textured, ends, kept, textures)
     else:
-        changes = TextureChanges(problems=dict.fromkeys(textured, HAS_TEXTURE))
+        changes = TextureChanges(
+            problems={
+                at: material_problem(at, "has a roughness texture", ProblemKind.TEXTURE)
+                for at in textured
+            }
+        )
     materials = [
         GltfMaterial(document.name(at), at, factors[at], 1.0, np.nan, np.nan, notes)
         for at, notes in changes.notes.items()
@@ -133,7 +137,7 @@ def convert_gltf(
     return GltfConversion(
         data=data if json == container.json else container.with_json(json, changes.appended),
         materials=tuple(sorted(materials, key=attrgetter("index"))),
-        problems=tuple((f"materials[{at}]", problems[at]) for at in sorted(problems)),
+        problems=tuple(problems[at] for at in sorted(problems)),
         files=changes.files,
         inputs=changes.inputs,
         generator=document.generator,
@@ -141,15 +145,15 @@ def convert_gltf(
     )
 
 
-def _factors(document: GltfDocument) -> tuple[dict[int, float], dict[int, str]]:
+def _factors(document: GltfDocument) -> tuple[dict[int, float], dict[int, MaterialProblem]]:
     """Return the roughness factors by the places of their materials, and what is wrong."""
     factors: dict[int, float] = {}
-    problems: dict[int, str] = {}
+    problems: dict[int, MaterialProblem] = {}
     for at, material in enumerate(document.materials):
         try:
             factors[at] = _factor(material)
         except MdfconvError as error:
-            problems[at] = str(error)
+            problems[at] = material_problem(at, str(error))
     return factors, problems
 
 
@@ -173,23 +177,18 @@ def _converted(
     factors: Mapping[int, float],
     ends: tuple[Endpoint, Endpoint],
     metric: Metric,
-) -> tuple[list[GltfMaterial], dict[int, str]]:
+) -> tuple[list[GltfMaterial], dict[int, MaterialProblem]]:
     """Return the conversions of materials without a texture, and why others have none."""
-    # A file repeats its values.
-    values, which = np.unique(np.array(list(factors.values())), return_inverse=True)
-    answers = convert_factors(values, *ends, metric)
-    notes, reasons = answers.notes, answers.problems
-    columns = [each.tolist() for each in (values, answers.result, answers.rmse, answers.parameter)]
-    rows = list(zip(*columns, strict=True))
+    table = FactorTable(set(factors.values()), *ends, metric)
     materials, problems = [], {}
-    for at, number in zip(factors, which.tolist(), strict=True):
-        if number in reasons:
-            problems[at] = reasons[number]
-        else:
-            note = (notes[number],) if number in notes else ()
-            value, result, rmse, parameter = rows[number]
-            name = document.name(at)
-            materials.append(GltfMaterial(name, at, value, result, rmse, parameter, note))
+    for at, factor in factors.items():
+        number = table[factor]
+        if problem := table.problem(number):
+            problems[at] = material_problem(at, problem)
+            continue
+        notes = tuple(filter(None, [table.note(number)]))
+        numbers = number.result, number.rmse, number.parameter
+        materials.append(GltfMaterial(document.name(at), at, factor, *numbers, notes))
     return materials, problems
 
 

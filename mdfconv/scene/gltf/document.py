@@ -10,11 +10,17 @@ from urllib.parse import unquote
 
 from mdfconv.errors import MdfconvError
 from mdfconv.scene.gltf.json_edit import JsonText, Place, read_json
+from mdfconv.scene.stored import MaterialProblem, ProblemKind
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 FACTOR = "roughnessFactor"
 TEXTURE = "metallicRoughnessTexture"
 PBR = "pbrMetallicRoughness"
+
+
+def material_problem(at: int, text: str, kind: ProblemKind = ProblemKind.OTHER) -> MaterialProblem:
+    """Return what is wrong with a material, by its place among them."""
+    return MaterialProblem(f"materials[{at}]", text, kind)
 
 
 def is_address(uri: str) -> bool:

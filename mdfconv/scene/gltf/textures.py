@@ -16,9 +16,10 @@ from mdfconv.distributions.parameter import Encoding
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
 from mdfconv.scene.gltf.container import Container
-from mdfconv.scene.gltf.document import FACTOR, GltfDocument, walk
+from mdfconv.scene.gltf.document import FACTOR, GltfDocument, material_problem, walk
 from mdfconv.scene.gltf.images import GltfImages, GltfTextures, index_of, is_count
 from mdfconv.scene.gltf.json_edit import JsonText, Place
+from mdfconv.scene.stored import MaterialProblem, ProblemKind
 from mdfconv.scene.texture.convert import converted_and_report
 from mdfconv.scene.texture.rule import TextureRule
 
@@ -45,7 +46,7 @@ class TextureChanges:
     """
 
     notes: dict[int, tuple[str, ...]] = field(default_factory=dict)
-    problems: dict[int, str] = field(default_factory=dict)
+    problems: dict[int, MaterialProblem] = field(default_factory=dict)
     files: dict[Path, bytes] = field(default_factory=dict)
     inputs: tuple[Path, ...] = ()
     appended: bytes = b""
@@ -89,7 +90,7 @@ def convert_textures(
             named[at] = index_of(_index(document.texture_of(at)), textures, "texture")
             versions[_image(textures, named[at], images), factor].append(at)
         except MdfconvError as error:
-            changes.problems[at] = str(error)
+            changes.problems[at] = material_problem(at, str(error))
     contents: dict[tuple[int, float], bytes] = {}
     notes: dict[tuple[int, float], list[str]] = {}
     for (image, factor), materials in versions.items():
@@ -101,7 +102,9 @@ def convert_textures(
             )
             notes[image, factor] = report.notes()
         except MdfconvError as error:
-            changes.problems |= dict.fromkeys(materials, f"images[{image}]: {error}")
+            kind = ProblemKind.LOSSY if error.argument == "lossy" else ProblemKind.OTHER
+            text = f"images[{image}]: {error}"
+            changes.problems |= {at: material_problem(at, text, kind) for at in materials}
     _write(document, textures, images, versions, contents, named, changes)
     for version, texts in notes.items():
         for at in changes.notes.keys() & versions[version]:
@@ -198,7 +201,7 @@ def _write(
             else:
                 images.replace(image, content)
         except MdfconvError as error:
-            changes.problems |= dict.fromkeys(materials, str(error))
+            changes.problems |= {at: material_problem(at, str(error)) for at in materials}
             continue
         changes.notes |= dict.fromkeys(materials, (f"with the texture of images[{image}]",))
     document.append("textures", new_textures)

@@ -31,6 +31,7 @@ from mdfconv.scene.mitsuba.scene import (
     read_scene,
 )
 from mdfconv.scene.mitsuba.xml_edit import Element
+from mdfconv.scene.stored import MaterialProblem
 
 # From parameters of the source to those of the target, NaN where there are none.
 _Rule = Callable[[Array], Array]
@@ -278,7 +279,9 @@ def _conversion(
             for each in scene.includes
         ),
         problems=tuple(
-            (scene.lines(bsdf.element.start), bsdf.problem) for bsdf in scene.bsdfs if bsdf.problem
+            MaterialProblem(scene.lines(bsdf.element.start), bsdf.problem)
+            for bsdf in scene.bsdfs
+            if bsdf.problem
         ),
     )
 

@@ -13,6 +13,7 @@ from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.material_files import FileConversion
 from mdfconv.scene.mtl.statements import Line, lines, named_files, number, split_options
 from mdfconv.scene.shininess import exponent_of, fit_error, roughness_of
+from mdfconv.scene.stored import MaterialProblem, ProblemKind
 
 # Tools that write libraries end at 1000, some at 10000: more is likely of another scale.
 _LARGEST_USUAL = 1e4
@@ -149,7 +150,12 @@ def convert_mtl(
     texts = _edited(content, blocks, materials, keywords, replace=replace)
     textures = _textures(content, blocks, b"map_" + keywords[0])
     if texture_names is None:
-        problems += [(each.line, f"{each.keyword} {each.file} is a texture") for each in textures]
+        # Only those of exponents can be converted.
+        kind = ProblemKind.TEXTURE if to == To.roughness else ProblemKind.OTHER
+        problems += [
+            MaterialProblem(each.line, f"{each.keyword} {each.file} is a texture", kind)
+            for each in textures
+        ]
     names = texture_names or {}
     _set_textures(texts, content, textures, b"map_" + keywords[1], names, replace=replace)
     return MtlConversion(
@@ -176,7 +182,7 @@ def texture_statements(data: bytes) -> tuple[TextureStatement, ...]:
 
 def _blocks(
     lines: list[Line], keywords: tuple[bytes, bytes]
-) -> tuple[list[_MaterialBlock], list[tuple[int, str]]]:
+) -> tuple[list[_MaterialBlock], list[MaterialProblem]]:
     """Return the materials, before the first ``newmtl`` one without a name, and problems."""
     blocks, problems = [_MaterialBlock("")], []
     for line in lines:
@@ -188,7 +194,7 @@ def _blocks(
         elif line.keyword == keywords[0]:
             problem, value = number(line.value, keywords[0])
             if problem:
-                problems.append((line.number, problem))
+                problems.append(MaterialProblem(line.number, problem))
             else:
                 # Of several statements readers take the last.
                 block.sources.append(line)

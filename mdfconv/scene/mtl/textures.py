@@ -11,6 +11,7 @@ from mdfconv.fitting.metrics import Metric
 from mdfconv.scene.material_files import free_name, read_file
 from mdfconv.scene.mtl.library import TextureStatement
 from mdfconv.scene.shininess import ROUGHNESS, SHININESS
+from mdfconv.scene.stored import MaterialProblem
 from mdfconv.scene.texture.convert import convert_texture_bytes
 from mdfconv.scene.texture.rule import TextureRule
 
@@ -28,14 +29,14 @@ class MtlTextures:
         The new files.
     inputs : tuple of Path
         The files that those were made from.
-    problems : list of (int, str)
+    problems : list of MaterialProblem
         For each texture that cannot be converted its line and the reason.
     """
 
     names: dict[str, str] = field(default_factory=dict)
     files: dict[Path, bytes] = field(default_factory=dict)
     inputs: tuple[Path, ...] = ()
-    problems: list[tuple[int, str]] = field(default_factory=list)
+    problems: list[MaterialProblem] = field(default_factory=list)
 
 
 def convert_textures(
@@ -81,7 +82,7 @@ def convert_textures(
                 done[source] = target
             found.names[texture.file] = done[source].name
         except MdfconvError as error:
-            found.problems.append((texture.line, str(error)))
+            found.problems.append(MaterialProblem(texture.line, str(error)))
         advance(1)
     found.inputs = tuple(done)
     return found

@@ -10,8 +10,9 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from mdfconv.errors import MdfconvError
+from mdfconv.scene.stored import Outcome
 from mdfconv.scene.texture.rule import TextureRule
-from mdfconv.scene.texture.values import Outcome, ValueConverter
+from mdfconv.scene.texture.values import ValueConverter
 
 # Rows that are rounded together, of a narrow picture: the memory grows with their square.
 _ROWS = 256
@@ -170,7 +171,7 @@ class TextureReport:
             Outcome.MIRROR: f"perfect mirrors in {source}: they get the smoothest {target}",
             Outcome.UNIFORM: f"as rough as can be in {source}: they get the roughest {target}",
             Outcome.UNANSWERED: "without an answer by the method, clamped to the nearest",
-            Outcome.CLAMPED: f"clamped: their results are outside 0..1 in {target}",
+            Outcome.BEYOND: f"clamped: their results are outside 0..1 in {target}",
             Outcome.OUTSIDE: f"clamped: they are outside 0..1 in {source}",
             Outcome.NAN: "NaN, and left so",
         }

@@ -27,7 +27,6 @@ from mdfconv.scene.mitsuba.scene import (
     MitsubaScene,
     bitmap_file,
     leave_what_others_use,
-    read_scene,
 )
 from mdfconv.scene.mitsuba.xml_edit import Element, XmlEdits, attribute_text
 from mdfconv.scene.stored import ConvertedNumber, MaterialProblem, Outcome, StoredConverter
@@ -157,7 +156,7 @@ def convert_mitsuba(
     """
     target = check_target(target)
     metric = metric_named(metric)
-    scene = read_scene(data)
+    scene = MitsubaScene(data)
     pending = [bsdf for bsdf in scene.bsdfs if not bsdf.problem and bsdf.distribution != target]
     numbers = _grouped((bsdf.source, bsdf.numbers) for bsdf in pending)
     tables = {
@@ -190,7 +189,7 @@ def convert_mitsuba(
         materials=tuple(materials),
         textures=tuple(textures.values()),
         named=scene.named,
-        includes=tuple((each.line, each.attributes.get("filename", "")) for each in scene.includes),
+        includes=tuple((each.line, each.get("filename")) for each in scene.includes),
         problems=tuple(
             MaterialProblem(bsdf.element.line, bsdf.problem) for bsdf in scene.bsdfs if bsdf.problem
         ),

@@ -52,6 +52,10 @@ class Element:
     line: int
     children: list[Element] = field(default_factory=list)
 
+    def get(self, attribute: str) -> str:
+        """Return the value of an attribute, "" if there is none."""
+        return self.attributes.get(attribute, "")
+
 
 def read_elements(data: bytes) -> list[Element]:
     """Return the elements of an XML file in the order of their starts, the root first.

@@ -150,10 +150,7 @@ class MaterialReport:
             known = known[: ROWS_SHOWN // len(IMPORTERS)]
         exponents = np.array([row[self.exponent] for row in known])
         for row, results in zip(known, importer_results(exponents, self.metric), strict=True):
-            row["importers"] = {
-                result.importer: {"roughness": result.roughness, "rmse": result.rmse}
-                for result in results
-            }
+            row["importers"] = {name: result._asdict() for name, result in results.items()}
 
     def _print_tables(self, record: dict[str, Any], conversion: FileConversion) -> None:
         rows = record["materials"]
@@ -188,15 +185,8 @@ class MaterialReport:
             self._print_table(cells, "Importers", count)
 
     def _print_table(self, rows: Rows, title: str, count: int) -> None:
-        print_table(
-            list(rows[0]),
-            rows,
-            title,
-            secondary=self.secondary,
-            err=True,
-            everything=_JSON,
-            count=count,
-        )
+        names, hidden = list(rows[0]), self.secondary
+        print_table(names, rows, title, secondary=hidden, err=True, everything=_JSON, count=count)
 
 
 def convert_files(
@@ -238,7 +228,11 @@ def convert_files(
     from mdfconv.scene import material_files
 
     # A second name may be meant for the result.
-    material_files.check_place(output, in_place=in_place)
+    if in_place == (output is not None):
+        raise MdfconvError(
+            "a file is converted into another file or folder (--output), or in place (--in-place)",
+            "choose one of them",
+        )
     files = find_files(patterns)
     destinations = material_files.choose_outputs(files, output)
     if output and material_files.is_folder(output):

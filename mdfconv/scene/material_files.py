@@ -61,15 +61,6 @@ def choose_outputs(files: Sequence[Path], output: str | None) -> list[Destinatio
     return [Destination(files[0], path)]
 
 
-def check_place(output: str | None, *, in_place: bool) -> None:
-    """Raise `MdfconvError` if results are to go nowhere or to two places."""
-    if in_place == (output is not None):
-        raise MdfconvError(
-            "a file is converted into another file or folder (--output), or in place (--in-place)",
-            "choose one of them",
-        )
-
-
 def is_folder(output: str) -> bool:
     """Return whether a name is that of a folder: one that is there, or with a slash at its end."""
     return output.endswith(("/", os.sep)) or Path(output).is_dir()
@@ -212,7 +203,10 @@ def write_conversions(
     new: set[Path] = set()
     for destination, original, conversion in changed:
         if destination.backup:
-            _check_unchanged(destination.source, original)
+            if read_file(destination.source) != original:
+                raise MdfconvError(
+                    f"will not change {destination.source}: it has changed since it was read"
+                )
             contents[destination.backup] = original
             backups[destination.backup] = destination.source
             new.add(destination.backup)
@@ -226,9 +220,3 @@ def write_conversions(
                 raise MdfconvError(f"two results would both be written to {path}")
     write_files(contents, new=new, like=backups)
     return [destination for destination, *_ in changed]
-
-
-def _check_unchanged(path: Path, original: bytes) -> None:
-    """Raise if a file is no longer what was read: somebody else is at it."""
-    if read_file(path) != original:
-        raise MdfconvError(f"will not change {path}: it has changed since it was read")

@@ -7,8 +7,7 @@ roughness by rules of their own: what they make of one, and what that costs, sta
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -116,34 +115,30 @@ def importer_roughness(importer: str, exponent: Array) -> Array:
     return clipped
 
 
-@dataclass(frozen=True)
-class ImporterResult:
+class ImporterResult(NamedTuple):
     """What an importer makes of an exponent.
 
     Parameters
     ----------
-    importer : str
-        One of `IMPORTERS`.
     roughness : float
         The roughness by its rule.
     rmse : float
         The error that it leaves, as `error_of`; infinite for a mirror.
     """
 
-    importer: str
     roughness: float
     rmse: float
 
 
-def importer_results(exponent: Array, metric: Metric) -> list[tuple[ImporterResult, ...]]:
+def importer_results(exponent: Array, metric: Metric) -> list[dict[str, ImporterResult]]:
     """Return what each of `IMPORTERS` makes of each exponent, shape (n,)."""
-    by_rule = []
+    results: list[dict[str, ImporterResult]] = [{} for _ in exponent]
     for importer in IMPORTERS:
         roughness = importer_roughness(importer, exponent)
         rmse = error_of(exponent, roughness, metric)
-        pairs = zip(roughness.tolist(), rmse.tolist(), strict=True)
-        by_rule.append([ImporterResult(importer, *pair) for pair in pairs])
-    return list(zip(*by_rule, strict=True))
+        for result, *pair in zip(results, roughness.tolist(), rmse.tolist(), strict=True):
+            result[importer] = ImporterResult(*pair)
+    return results
 
 
 # Where the error of a rule for exponents is given.
@@ -168,24 +163,23 @@ def encoding_records(metric: Metric) -> list[dict[str, Any]]:
         in Blinn/Phong's place, with a specular weight of 1; infinite for a mirror.
     """
     texts = ("encoding", "formula", "range", "clamped", "programs", "source", "note")
-    costs = [f"{what}_{n}" for n in EXPONENTS for what in ("roughness", "rmse")]
+    columns = [f"{what}_{n}" for n in EXPONENTS for what in ImporterResult._fields]
     blank: dict[str, Any] = dict.fromkeys(texts, "")
-    blank |= {"specular": Specular.no.value} | dict.fromkeys(costs)
-    by_importer: dict[str, dict[str, float]] = {importer: {} for importer in IMPORTERS}
-    for n, results in zip(
-        EXPONENTS, importer_results(np.array(EXPONENTS, float), metric), strict=True
-    ):
-        for result in results:
-            cost = {f"roughness_{n}": result.roughness, f"rmse_{n}": result.rmse}
-            by_importer[result.importer] |= cost
+    blank |= {"specular": Specular.no.value} | dict.fromkeys(columns)
+    by_exponent = importer_results(np.array(EXPONENTS, float), metric)
     records = []
     for owner in list_distributions():
         for own in owner.encodings:
             known = {"encoding": f"{owner.name}:{own.name}", "formula": own.formula}
             records.append(blank | known | {"range": own.stored.legal})
         for dialect in dialects_of(owner.name).values():
-            cost = by_importer.get(dialect.name, {})
-            records.append(blank | _texts(owner.name, dialect) | cost)
+            costs = {
+                f"{what}_{n}": value
+                for n, results in zip(EXPONENTS, by_exponent, strict=True)
+                if dialect.name in results
+                for what, value in results[dialect.name]._asdict().items()
+            }
+            records.append(blank | _texts(owner.name, dialect) | costs)
     return records
 
 

@@ -13,8 +13,11 @@ _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _BLANKS = b" \t"
 # A line and what ends it.
 _LINE = re.compile(rb"([^\r\n]*)(\r\n|\n|\r|\Z)")
-_START = re.compile(
-    rb"((?:\xef\xbb\xbf)?[ \t]*)(newmtl|Ns|Pr|map_Ns|map_Pr)(?=[ \t#]|\Z)",
+# Indentation, keyword, blanks, value, and blanks with a comment. Blanks are taken all or none, so
+# that a long line takes no long time.
+_STATEMENT = re.compile(
+    rb"((?:\xef\xbb\xbf)?[ \t]*)(newmtl|Ns|Pr|map_Ns|map_Pr)(?=[ \t#]|\Z)([ \t]*)"
+    rb"((?:[^ \t#]++|[ \t]++(?=[^ \t#]))*+)(.*)\Z"
 )
 # In any case of letters, as readers take them.
 _TEXTURE = re.compile(rb"[ \t]*(?:map_\w+|bump|disp|decal|refl|norm)[ \t]+(.*)\Z", re.IGNORECASE)
@@ -113,21 +116,16 @@ def read_library(data: bytes) -> tuple[list[Line], list[MaterialBlock]]:
         content, end = match.groups()
         if not (content or end):
             break
-        start = _START.match(content)
-        if not start:
-            lines.append(Line(content, b"", b"", b"", b"", end, number))
-            continue
-        before, keyword = start.groups()
-        rest = content[start.end() :]
-        gap = rest[: len(rest) - len(rest.lstrip(_BLANKS))]
-        text, mark, comment = rest[len(gap) :].partition(b"#")
-        value = text.rstrip(_BLANKS)
-        after = text[len(value) :] + mark + comment
+        statement = _STATEMENT.match(content)
+        before, keyword, gap, value, after = (
+            statement.groups() if statement else (content, b"", b"", b"", b"")
+        )
         line = Line(before, keyword, gap, value, after, end, number)
         lines.append(line)
         if keyword == b"newmtl":
             blocks.append(MaterialBlock(value.decode(errors="replace")))
-        blocks[-1].statements.setdefault(keyword, []).append(line)
+        elif keyword:
+            blocks[-1].statements.setdefault(keyword, []).append(line)
     return lines, blocks
 
 

@@ -117,10 +117,15 @@ def command(
 
     mdfconv gltf lamp.gltf -o new.gltf --from blinn-phong:assimp-gltf --specular 0.5 --compare
     """
+    from mdfconv.distributions.endpoint import with_specular
+    from mdfconv.scene.gltf.asset import convert_gltf, factor_endpoints
+    from mdfconv.scene.gltf.images import GltfTextures
+    from mdfconv.scene.shininess import ROUGHNESS, SHININESS
+
     if guess:
-        given = [option.name for option in context.command.params if option.name]
-        ignored = set(given) - {"files", "guess"}
-        refuse_given(context, ignored, "does not go with --guess, which only proposes --from")
+        others = {option.name for option in context.command.params if option.name}
+        others -= {"files", "guess"}
+        refuse_given(context, others, "does not go with --guess, which only proposes --from")
         _propose(files)
         return
     if not textures:
@@ -130,45 +135,7 @@ def command(
             "the rule by which the factors were stored is missing: give --from",
             "--guess proposes one",
         )
-    _convert(
-        context,
-        files,
-        output,
-        source,
-        target,
-        chosen_metric(metric, exposure),
-        specular=specular,
-        in_place=in_place,
-        force=force,
-        textures=textures,
-        lossy=lossy,
-        compare=compare,
-        form=format_,
-    )
-
-
-def _convert(
-    context: typer.Context,
-    files: list[str],
-    output: str | None,
-    source: str,
-    target: str | None,
-    metric: Metric,
-    *,
-    specular: float | None,
-    in_place: bool,
-    force: bool,
-    textures: bool,
-    lossy: bool,
-    compare: bool,
-    form: ReportFormat,
-) -> None:
-    from mdfconv.distributions.endpoint import with_specular
-    from mdfconv.scene.gltf.asset import convert_gltf
-    from mdfconv.scene.gltf.factors import factor_endpoints
-    from mdfconv.scene.gltf.images import GltfTextures
-    from mdfconv.scene.shininess import ROUGHNESS, SHININESS
-
+    kept = chosen_metric(metric, exposure)
     names = with_specular(source, target or ROUGHNESS, specular)
     # A mistake in the names is none of a file.
     ends = factor_endpoints(*names)
@@ -180,7 +147,7 @@ def _convert(
         folders = GltfTextures(destination.source.parent, destination.output.parent, lossy)
         chosen = folders if textures else None
         with about(destination.source):
-            conversion = convert_gltf(data, *ends, metric=metric, textures=chosen)
+            conversion = convert_gltf(data, *ends, metric=kept, textures=chosen)
         _tell_other_generator(destination.source, conversion.generator, ends[0])
         problems = tuple(map(_with_option, conversion.problems))
         return dataclasses.replace(conversion, problems=problems)
@@ -191,15 +158,15 @@ def _convert(
         output,
         in_place=in_place,
         force=force,
-        metric=metric,
+        metric=kept,
         convert=convert,
-        report=lambda converted: _report(converted, metric, names, form=form, compare=compare),
+        report=lambda converted: _report(converted, kept, names, form=format_, compare=compare),
     )
 
 
 def _check_form(destination: Destination, data: bytes) -> None:
     """Refuse a name that says of a file that it is of the other form, which it does not become."""
-    from mdfconv.scene.gltf.container import is_glb
+    from mdfconv.scene.gltf.document import is_glb
 
     form = ".glb" if is_glb(data) else ".gltf"
     named = destination.output.suffix.lower()

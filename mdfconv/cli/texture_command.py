@@ -139,10 +139,10 @@ def command(
             lossy=lossy,
             max_pixels=max_pixels,
             progress=progress,
-            files=files,
+            fill=files.fill,
         )
         if png:
-            from mdfconv.scene.texture.figure import draw_histograms
+            from mdfconv.scene.texture.texel_map import draw_histograms
 
             files.add(png, draw_histograms(report, f"{source_file.name} → {output.name}"))
     for note in report.notes():

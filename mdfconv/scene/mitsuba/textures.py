@@ -53,7 +53,7 @@ class BitmapConverter:
             stem = f"{source.stem}_{self._target}"
             target = free_name(self._output.parent, stem, source.suffix, self._files)
             rule = TextureRule(distribution, self._target, metric=self._metric)
-            self._files[target] = convert_texture_bytes(read_file(source), source.suffix, rule)
+            self._files[target], _ = convert_texture_bytes(read_file(source), source.suffix, rule)
             self._done[key] = target.name
         return self._done[key]
 

@@ -78,7 +78,9 @@ def convert_textures(
         try:
             if source not in done:
                 target = free_name(output.parent, f"{source.stem}_Pr", source.suffix, found.files)
-                found.files[target] = convert_texture_bytes(read_file(source), source.suffix, rule)
+                found.files[target], _ = convert_texture_bytes(
+                    read_file(source), source.suffix, rule
+                )
                 done[source] = target
             found.names[texture.file] = done[source].name
         except MdfconvError as error:

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mdfconv.cli import completion
 from mdfconv.cli.material_files import (
     InPlaceOption,
+    MaterialReport,
     ReportFormat,
     ReportFormatOption,
     ResultOption,
     about,
     convert_files,
-    material_rows,
-    print_importers,
-    print_materials,
 )
 from mdfconv.cli.options import (
     ExposureOption,
@@ -29,21 +26,21 @@ from mdfconv.cli.options import (
 )
 from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
-from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from mdfconv.distributions.endpoint import Endpoint
-    from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.gltf.asset import GltfConversion
     from mdfconv.scene.material_files import Destination
-    from mdfconv.scene.stored import MaterialProblem
 
 _HEADINGS = {
     "index": "#", "name": "material", "value": "was", "result": "is", "rmse": "RMSE",
     "notes": "notes",
 }  # fmt: skip
+_KEYS = (
+    "file", "output", "from", "to", "metric", "count", "materials", "textures", "problems",
+)  # fmt: skip
 
 
 def command(
@@ -121,11 +118,12 @@ def command(
     from mdfconv.scene.gltf.asset import convert_gltf, factor_endpoints
     from mdfconv.scene.gltf.images import GltfTextures
     from mdfconv.scene.shininess import ROUGHNESS, SHININESS
+    from mdfconv.scene.stored import ProblemKind
 
     if guess:
-        others = {option.name for option in context.command.params if option.name}
-        others -= {"files", "guess"}
-        refuse_given(context, others, "does not go with --guess, which only proposes --from")
+        given = [option.name for option in context.command.params if option.name]
+        ignored = set(given) - {"files", "guess"}
+        refuse_given(context, ignored, "does not go with --guess, which only proposes --from")
         _propose(files)
         return
     if not textures:
@@ -135,7 +133,7 @@ def command(
             "the rule by which the factors were stored is missing: give --from",
             "--guess proposes one",
         )
-    kept = chosen_metric(metric, exposure)
+    chosen = chosen_metric(metric, exposure)
     names = with_specular(source, target or ROUGHNESS, specular)
     # A mistake in the names is none of a file.
     ends = factor_endpoints(*names)
@@ -145,23 +143,28 @@ def command(
     def convert(destination: Destination, data: bytes) -> GltfConversion:
         _check_form(destination, data)
         folders = GltfTextures(destination.source.parent, destination.output.parent, lossy)
-        chosen = folders if textures else None
         with about(destination.source):
-            conversion = convert_gltf(data, *ends, metric=kept, textures=chosen)
+            conversion = convert_gltf(
+                data, *ends, metric=chosen, textures=folders if textures else None
+            )
         _tell_other_generator(destination.source, conversion.generator, ends[0])
-        problems = tuple(map(_with_option, conversion.problems))
-        return dataclasses.replace(conversion, problems=problems)
+        return conversion
 
-    convert_files(
-        context,
-        files,
-        output,
-        in_place=in_place,
-        force=force,
-        metric=kept,
-        convert=convert,
-        report=lambda converted: _report(converted, kept, names, form=format_, compare=compare),
+    report = MaterialReport(
+        form=format_,
+        metric=chosen,
+        keys=_KEYS,
+        details=lambda conversion: {
+            "from": names[0],
+            "to": names[1],
+            "textures": list(map(str, conversion.files)),
+        },
+        headings=_HEADINGS,
+        place="place",
+        remedies={ProblemKind.TEXTURE: ": --textures converts it", ProblemKind.LOSSY: " (--lossy)"},
+        exponent="parameter" if compare else "",
     )
+    convert_files(context, files, output, convert, report, in_place=in_place, force=force)
 
 
 def _check_form(destination: Destination, data: bytes) -> None:
@@ -202,18 +205,6 @@ def _proposals(generator: str) -> dict[str, str]:
     return proposals
 
 
-def _with_option(problem: MaterialProblem) -> MaterialProblem:
-    """Return what is wrong with a material, with the option that helps."""
-    from mdfconv.scene.stored import ProblemKind
-
-    options = {
-        ProblemKind.TEXTURE: ": --textures converts it",
-        ProblemKind.LOSSY: " (--lossy)",
-        ProblemKind.OTHER: "",
-    }
-    return problem._replace(text=problem.text + options[problem.kind])
-
-
 def _propose(files: list[str]) -> None:
     """Print which source each file's generator lets expect."""
     from mdfconv.output.files import find_files
@@ -228,40 +219,3 @@ def _propose(files: list[str]) -> None:
         said = f"asset.generator is '{generator}'" if generator else "no asset.generator"
         lines.append(f"{path}: {said}: {' or '.join(proposals) or 'unknown'}")
     typer.echo("\n".join(lines))
-
-
-def _report(
-    converted: list[tuple[Destination, GltfConversion]],
-    metric: Metric,
-    names: tuple[str, str],
-    *,
-    form: ReportFormat,
-    compare: bool,
-) -> None:
-    every = form is ReportFormat.json
-    known = [[material.parameter for material in each.materials] for _, each in converted]
-    records: list[dict[str, Any]] = [
-        {
-            "file": str(destination.source),
-            "output": str(destination.output),
-            "from": names[0],
-            "to": names[1],
-            "metric": str(metric),
-            "count": len(conversion.materials),
-            "materials": material_rows(
-                conversion.materials, exponents, metric, every=every, compare=compare
-            ),
-            "textures": [str(path) for path in conversion.files],
-            "problems": [
-                {"place": place, "problem": text} for place, text, _ in conversion.problems
-            ],
-        }
-        for (destination, conversion), exponents in zip(converted, known, strict=True)
-    ]
-    if every:
-        typer.echo(json_text(records))
-        return
-    for record, exponents in zip(records, known, strict=True):
-        print_materials(record, _HEADINGS, record["count"])
-        if compare:
-            print_importers(record, exponents)

@@ -171,8 +171,10 @@ class StoredConverter:
         lobes = self.target.decode_legal(result)
         known = ~np.isnan(parameter) & ~np.isnan(lobes)
         rmse = np.full(lobes.shape, np.nan)
-        ends = self._pair[0], parameter[known], self._pair[1], lobes[known]
-        rmse[known], _ = remaining_error(*ends, self.metric)
+        source, target = self._pair
+        rmse[known], _ = remaining_error(
+            source, parameter[known], target, lobes[known], self.metric
+        )
         return rmse
 
     def refusal(self, number: ConvertedNumber) -> str:

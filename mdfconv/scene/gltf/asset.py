@@ -116,7 +116,7 @@ def convert_gltf(
     MdfconvError
         If the file is no glTF 2.0, or a name or the metric is not known.
     """
-    ends = factor_endpoints(source, target)
+    pair = factor_endpoints(source, target)
     metric = metric_named(metric)
     document = GltfDocument(data)
     factors, problems = _factors(document)
@@ -125,7 +125,7 @@ def convert_gltf(
     materials: list[GltfMaterial] = []
     changes = None
     if textures:
-        changes = TextureConversion(document, textures, *ends, metric, textured)
+        changes = TextureConversion(document, textures, *pair, metric, textured)
         materials = [
             GltfMaterial(document.name(at), at, factors[at], 1.0, np.nan, np.nan, notes)
             for at, notes in changes.notes.items()
@@ -134,7 +134,7 @@ def convert_gltf(
     else:
         problem = "has a roughness texture", ProblemKind.TEXTURE
         problems |= dict.fromkeys(textured, problem)
-    numbers, reasons, notes = _numbers(plain.values(), StoredConverter(*ends, metric))
+    numbers, reasons, notes = _numbers(plain.values(), StoredConverter(*pair, metric))
     for at, factor in plain.items():
         if factor in reasons:
             problems[at] = reasons[factor], ProblemKind.OTHER
@@ -164,15 +164,15 @@ def factor_endpoints(source: str | Endpoint, target: str | Endpoint) -> tuple[En
     MdfconvError
         If a name is not known, or what it stands for is used beyond 1, as an exponent is.
     """
-    ends = endpoints(source, target)
-    for argument, end in zip(("source", "target"), ends, strict=True):
+    pair = endpoints(source, target)
+    for argument, end in zip(("source", "target"), pair, strict=True):
         if end.stored.typical[1] > 1:
             raise MdfconvError(
                 f"a roughness factor is at most 1, {end.label} is more as a rule",
                 "name what the program stores",
                 argument=argument,
             )
-    return ends
+    return pair
 
 
 def _factors(

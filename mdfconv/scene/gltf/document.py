@@ -191,16 +191,16 @@ class GltfDocument:
 
 def walk(value: Any) -> list[tuple[str, Any]]:
     """Return all members of all objects within a value, however deeply."""
-    found: list[tuple[str, Any]] = []
+    members: list[tuple[str, Any]] = []
     waiting = [value]
     while waiting:
         value = waiting.pop()
         if isinstance(value, dict):
-            found += value.items()
+            members += value.items()
             waiting += value.values()
         elif isinstance(value, list):
             waiting += value
-    return found
+    return members
 
 
 def _padding(size: int) -> int:

@@ -88,30 +88,30 @@ class JsonText:
     def members(self, start: int) -> dict[str, Place]:
         """Return the members of the object that starts at a character."""
         text, position = self._text, start + 1
-        found = {}
+        members = {}
         while match := _KEY.match(text, position):
             value, end = _decode(text, match.end())
             key = match[1]
             name = key[1:-1] if key.isprintable() and "\\" not in key else json.loads(key)
-            found[name] = Place(value, match.end(), end, match.start(1), match[2])
+            members[name] = Place(value, match.end(), end, match.start(1), match[2])
             comma = _COMMA.match(text, end)
             if not comma:
                 break
             position = comma.end()
-        return found
+        return members
 
     def elements(self, start: int) -> list[Place]:
         """Return the elements of the array that starts at a character."""
         text, position = self._text, _skip(self._text, start + 1)
-        found: list[Place] = []
+        elements: list[Place] = []
         while text[position] != "]":
             value, end = _decode(text, position)
-            found.append(Place(value, position, end, position))
+            elements.append(Place(value, position, end, position))
             comma = _COMMA.match(text, end)
             if not comma:
                 break
             position = comma.end()
-        return found
+        return elements
 
     def numbers_named(self, name: str, place: Place) -> list[tuple[int, int]] | None:
         """Return where the numbers of all members of one name stand, however deeply.

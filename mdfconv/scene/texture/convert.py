@@ -82,7 +82,7 @@ def convert_texture(
     step = _rows_a_block(rows.shape[1])
     for start in range(0, len(rows), step):
         results[start : start + step] = convert(rows[start : start + step])
-    for note in convert.report().notes(ends=False)[:1]:
+    for note in convert.report().notes(limits=False)[:1]:
         warnings.warn(note, MdfconvWarning, stacklevel=2)
     return converted
 

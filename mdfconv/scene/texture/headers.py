@@ -13,7 +13,7 @@ Reason: TypeAlias = tuple[str, str]
 PALETTE = ("has a palette: its texels are indices, not values", "save it as grey or RGB")
 SEVERAL_PICTURES = ("holds several pictures, of which only one would be kept", "split it")
 # Chunks that say how a PNG's texels are meant, and stay true when some are converted.
-_PNG_KEPT = (b"cHRM", b"gAMA", b"iCCP", b"sRGB", b"cICP", b"pHYs")
+_TEXEL_CHUNKS = (b"cHRM", b"gAMA", b"iCCP", b"sRGB", b"cICP", b"pHYs")
 _PNG_HEADER = 33  # bytes, of the signature and the first chunk
 _PNG_END = b"IEND\xaeB`\x82"
 _TGA_END = b"TRUEVISION-XFILE.\0"
@@ -88,10 +88,10 @@ class PngHeader:
         except zlib.error:
             return b""
 
-    def kept(self) -> bytes:
+    def texel_chunks(self) -> bytes:
         """Return the chunks that belong into the converted file."""
         return b"".join(
-            png_chunk(name, self._chunks[name]) for name in _PNG_KEPT if name in self._chunks
+            png_chunk(name, self._chunks[name]) for name in _TEXEL_CHUNKS if name in self._chunks
         )
 
 

@@ -52,14 +52,14 @@ def quiet_streams() -> Iterator[None]:
 _GREY = ("y", "l", "grey", "gray")
 
 
-def find_channels(picture: Picture, wanted: str | None) -> tuple[int, ...]:
+def find_channels(picture: Picture, chosen: str | None) -> tuple[int, ...]:
     """Return which channels of a picture are to be converted.
 
     Parameters
     ----------
     picture : Picture
         The picture.
-    wanted : str or None
+    chosen : str or None
         One name, several with commas between, or letters that are names each, as ``"rgb"``;
         None for the only one. Case does not matter where it does not tell two apart, and grey
         has several names.
@@ -71,26 +71,26 @@ def find_channels(picture: Picture, wanted: str | None) -> tuple[int, ...]:
     """
     source, names = picture.source, picture.names
     known = ", ".join(name.lower() if len(name) == 1 else name for name in names)
-    if wanted is None:
+    if chosen is None:
         if len(names) != 1:
             raise MdfconvError(
                 f"{source} has the channels {known}", "choose one channel", argument="channel"
             )
         return (0,)
-    whole = _find(names, wanted)
-    parts = wanted.split(",") if "," in wanted else list(wanted)
+    whole = _find(names, chosen)
+    parts = chosen.split(",") if "," in chosen else list(chosen)
     places = [whole] if whole is not None else [_find(names, part) for part in parts]
     indices = tuple(index for index in places if index is not None)
     if not indices or len(set(indices)) != len(places):
-        raise MdfconvError(f"{source} has no channel '{wanted}'", f"its channels are {known}")
+        raise MdfconvError(f"{source} has no channel '{chosen}'", f"its channels are {known}")
     return indices
 
 
-def _find(names: Sequence[str], wanted: str) -> int | None:
-    if wanted in names:
-        return names.index(wanted)
-    keys = [_key(name) for name in names]
-    return keys.index(_key(wanted)) if keys.count(_key(wanted)) == 1 else None
+def _find(names: Sequence[str], name: str) -> int | None:
+    if name in names:
+        return names.index(name)
+    keys = [_key(each) for each in names]
+    return keys.index(_key(name)) if keys.count(_key(name)) == 1 else None
 
 
 def _key(name: str) -> str:
@@ -123,7 +123,7 @@ _DTYPES = {
 _NAMES = {dtype: name for name, dtype in _DTYPES.items()}
 # Of the attributes of a picture those that are about its texels; the writer of TIFF makes the
 # vertical resolution from the horizontal one and the aspect.
-_KEPT = ("XResolution", "YResolution", "ResolutionUnit", "PixelAspectRatio", "Orientation")
+_ATTRIBUTES = ("XResolution", "YResolution", "ResolutionUnit", "PixelAspectRatio", "Orientation")
 
 
 @dataclass(frozen=True)
@@ -324,13 +324,13 @@ class Picture:
         with reading(self.source):
             if spec.tile_width:
                 columns = spec.x, spec.x + spec.width
-                found = self._file.read_tiles(*columns, *rows, 0, 1, first, last, kind)
+                texels = self._file.read_tiles(*columns, *rows, 0, 1, first, last, kind)
             else:
-                found = self._file.read_scanlines(*rows, 0, first, last, kind)
+                texels = self._file.read_scanlines(*rows, 0, first, last, kind)
             fault = self._file.geterror()
-            if found is None or fault:
+            if texels is None or fault:
                 raise ValueError(fault)
-        return np.asarray(found).reshape(bottom - top, spec.width, last - first)
+        return np.asarray(texels).reshape(bottom - top, spec.width, last - first)
 
     def profile(self) -> bytes:
         """Return the colour profile; empty if there is none."""
@@ -342,12 +342,12 @@ class Picture:
     def remark(self) -> str:
         """Return what the user must know of how the texels were taken; empty if nothing."""
         with reading(self.source):
-            found = PngHeader(self.source.path).gamma() if self.form is PNG else ""
+            what = PngHeader(self.source.path).gamma() if self.form is PNG else ""
             if self.profile():
                 name = self.spec.get_string_attribute("ICCProfile:profile_description")
-                found = f"a colour profile ({name})" if name else "a colour profile"
-        return found and (
-            f"{self.source} has {found}, which is not for data: its texels were taken as they are"
+                what = f"a colour profile ({name})" if name else "a colour profile"
+        return what and (
+            f"{self.source} has {what}, which is not for data: its texels were taken as they are"
         )
 
 
@@ -470,7 +470,7 @@ def check_output(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> N
 
 @contextmanager
 def written(
-    beside: Path, form: PictureForm, picture: Picture, dtype: np.dtype[Any]
+    path: Path, form: PictureForm, picture: Picture, dtype: np.dtype[Any]
 ) -> Iterator[Callable[[NDArray[Any]], None]]:
     """Give what takes the rows of a converted picture, for a file that is there and empty.
 
@@ -484,7 +484,7 @@ def written(
     with reading(picture.source):  # whose texts may be none
         spec = _output_spec(picture, form, dtype)
     file: Any = OpenImageIO.ImageOutput.create(form.library)
-    if not file.open(str(beside), spec):
+    if not file.open(str(path), spec):
         raise OSError(file.geterror())
     top = spec.y
 
@@ -508,30 +508,30 @@ def written(
     if not closed:
         raise OSError(file.geterror())
     if form is PNG:
-        replace_chunks(beside, _png_chunks(picture))
+        replace_chunks(path, _png_chunks(picture))
     if form is TGA:
-        check_tga(beside, spec.image_bytes())
+        check_tga(path, spec.image_bytes())
 
 
 def _output_spec(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> Any:
     """Return what a converted file says of itself."""
     import OpenImageIO
 
-    given = picture.spec
+    original = picture.spec
     if form is EXR:
-        spec = given.copy()
+        spec = original.copy()
         # The rows come from the top.
         spec.attribute("openexr:lineOrder", "increasingY")
-        if not _is_lossless(given):
+        if not _is_lossless(original):
             spec.attribute("compression", "zip")
     else:
         spec = OpenImageIO.ImageSpec(
-            picture.width, picture.height, given.nchannels, _NAMES[dtype.name]
+            picture.width, picture.height, original.nchannels, _NAMES[dtype.name]
         )
-        spec.channelnames, spec.alpha_channel = given.channelnames, given.alpha_channel
+        spec.channelnames, spec.alpha_channel = original.channelnames, original.alpha_channel
         spec.attribute("oiio:UnassociatedAlpha", 1)
         spec.attribute("compression", "none" if form is TGA else "zip")
-    if not given.get_string_attribute("DateTime"):
+    if not original.get_string_attribute("DateTime"):
         spec.attribute("DateTime", "")  # or it would be now
     if form is PNG:
         for name, value in _PNG_SETTINGS.items():
@@ -541,8 +541,8 @@ def _output_spec(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> A
         if profile := picture.profile():
             kind = OpenImageIO.TypeDesc(f"uint8[{len(profile)}]")
             spec.attribute("ICCProfile", kind, np.frombuffer(profile, np.uint8))
-        for attribute in given.extra_attribs:
-            if attribute.name in _KEPT:
+        for attribute in original.extra_attribs:
+            if attribute.name in _ATTRIBUTES:
                 spec.attribute(attribute.name, attribute.type, attribute.value)
     return spec
 
@@ -553,7 +553,7 @@ def _png_chunks(picture: Picture) -> bytes:
     OpenImageIO calls all texels sRGB there, and ends the process over a faulty profile.
     """
     if picture.form is PNG:
-        return PngHeader(picture.source.path).kept()
+        return PngHeader(picture.source.path).texel_chunks()
     chunks, spec = b"", picture.spec
     if profile := picture.profile():
         chunks += png_chunk(b"iCCP", b"ICC profile\0\0" + zlib.compress(profile))

@@ -160,8 +160,8 @@ class TextureReport:
     after: NDArray[np.int64]
     remark: str = ""
 
-    def notes(self, *, ends: bool = True) -> list[str]:
-        """Return what the user must know; `ends` includes mirrors and the roughest."""
+    def notes(self, *, limits: bool = True) -> list[str]:
+        """Return what the user must know; `limits` includes mirrors and the roughest."""
         source, target = self.source, self.target
         texts = {
             Outcome.MIRROR: f"perfect mirrors in {source}: they get the smoothest {target}",
@@ -171,7 +171,7 @@ class TextureReport:
             Outcome.OUTSIDE: f"clamped: they are outside 0..1 in {source}",
             Outcome.NAN: "NaN, and left so",
         }
-        if not ends:
+        if not limits:
             del texts[Outcome.MIRROR], texts[Outcome.UNIFORM]
         counts = [
             f"{self.outcomes[outcome]} of {self.texels} texels are {text}"

@@ -157,13 +157,7 @@ def convert_gltf(
 
 
 def factor_endpoints(source: str | Endpoint, target: str | Endpoint) -> tuple[Endpoint, Endpoint]:
-    """Return both ends of a conversion of factors, which are at most 1.
-
-    Raises
-    ------
-    MdfconvError
-        If a name is not known, or what it stands for is used beyond 1, as an exponent is.
-    """
+    """Return both ends of a conversion; refuse what is used beyond 1, as an exponent is."""
     pair = endpoints(source, target)
     for argument, end in zip(("source", "target"), pair, strict=True):
         if end.stored.typical[1] > 1:
@@ -239,13 +233,7 @@ def _texts(materials: Sequence[GltfMaterial]) -> dict[int, str]:
 
 
 def generator_of(data: bytes) -> str:
-    """Return what wrote a glTF file, as it says itself in ``asset.generator``; "" if nothing.
-
-    Raises
-    ------
-    MdfconvError
-        If the file is no glTF.
-    """
+    """Return what wrote a glTF file, as it says itself in ``asset.generator``; "" if nothing."""
     return GltfDocument(data).generator
 
 

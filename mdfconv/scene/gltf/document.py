@@ -35,13 +35,7 @@ def is_glb(data: bytes) -> bool:
 
 
 class GltfDocument:
-    """A glTF file.
-
-    Raises
-    ------
-    MdfconvError
-        If it is no glTF 2.0, or a GLB that is incomplete.
-    """
+    """A glTF file, and the changes to it; what is no glTF 2.0 is refused."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -154,13 +148,7 @@ class GltfDocument:
         return self.array("materials")
 
     def encoded(self) -> bytes:
-        """Return the file with all changes, every other chunk of a GLB as it is.
-
-        Raises
-        ------
-        MdfconvError
-            If it no longer fits into a GLB.
-        """
+        """Return the file with all changes, every other chunk of a GLB as it is."""
         if self._appended:
             length = self._binary_size + len(self._appended)
             self.json.set_members(self.array("buffers")[0].start, {"byteLength": str(length)})

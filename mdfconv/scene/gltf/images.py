@@ -43,13 +43,7 @@ class GltfTextures:
 
 
 def index_of(value: Any, entries: list[Any], what: str) -> int:
-    """Return an index into the entries of a file, which are objects.
-
-    Raises
-    ------
-    MdfconvError
-        If there is no such entry.
-    """
+    """Return an index into the entries of a file; refuse what names none that is an object."""
     if not is_count(value) or not 0 <= value < len(entries):
         raise MdfconvError(f"names no {what} that is there")
     if not isinstance(entries[int(value)].value, dict):
@@ -64,17 +58,7 @@ def is_count(value: Any) -> bool:
 
 
 class GltfImages:
-    """The images of a file.
-
-    Parameters
-    ----------
-    document : GltfDocument
-        The file, which is changed.
-    folders : GltfTextures
-        Where other files are.
-    ending : str
-        What the names of new files end in, before the suffix.
-    """
+    """The images of a document, which is changed; new files have an ending before the suffix."""
 
     def __init__(self, document: GltfDocument, folders: GltfTextures, ending: str) -> None:
         self._document, self._folders, self._ending = document, folders, ending
@@ -87,13 +71,7 @@ class GltfImages:
         self._new_views: list[str] = []
 
     def read(self, image: int) -> tuple[bytes, str]:
-        """Return the content of an image and the suffix of its form.
-
-        Raises
-        ------
-        MdfconvError
-            If it cannot be found, or is neither PNG nor JPEG.
-        """
+        """Return the content of an image and the suffix of its form."""
         entry = self.images[image].value
         if ("uri" in entry) == ("bufferView" in entry):
             raise MdfconvError("has not one of uri and bufferView")

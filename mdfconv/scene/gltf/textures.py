@@ -23,20 +23,11 @@ _OCCLUSION = "occlusionTexture"
 
 @dataclass
 class _Version:
-    """An image under one factor, and the materials that show it.
-
-    Parameters
-    ----------
-    image : int
-        Its index.
-    factor : float
-        What its texels are multiplied by.
-    textures : dict of int to int
-        From the places of the materials to the textures that they name.
-    """
+    """An image under one factor, and the materials that show it."""
 
     image: int
     factor: float
+    # From the places of the materials to the textures that they name.
     textures: dict[int, int] = field(default_factory=dict)
 
 
@@ -44,20 +35,9 @@ class TextureConversion:
     """The conversion of the roughness textures of materials, each with the factor before it.
 
     A texel t becomes the conversion of factor · t. An image that nothing else needs is replaced;
-    where it has another use, or is used with other factors, an image and a texture are added.
-
-    Parameters
-    ----------
-    document : GltfDocument
-        The file, which is changed, but for the factors.
-    folders : GltfTextures
-        Where other files are.
-    source, target : Endpoint
-        What effective roughness is, and what it becomes.
-    metric : Metric
-        What the fit keeps.
-    factors : mapping of int to float
-        Those of the materials that have a texture, by their places: above 0, at most 1.
+    where it has another use, or is used with other factors, an image and a texture are added. The
+    document is changed, but for the factors, which are those of the materials that have a texture,
+    by their places: above 0, at most 1.
     """
 
     def __init__(

@@ -208,11 +208,6 @@ def convert_texture_bytes(
     """Convert the content of a picture file, whose name ends in a suffix such as ``".png"``.
 
     With `lossy` a JPEG is taken, too, and becomes a PNG.
-
-    Raises
-    ------
-    MdfconvError
-        As `convert_texture_file`.
     """
     with TemporaryDirectory() as folder:
         source = PictureFile(Path(folder) / f"texture{suffix}", "the texture")

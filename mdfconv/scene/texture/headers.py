@@ -32,18 +32,7 @@ _TGA_BITS = {2: (24, 32), 3: (8,), 10: (24, 32), 11: (8,)}
 
 
 class PngHeader:
-    """The chunks of a PNG file before its texels.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    ValueError
-        If a chunk is damaged.
-    """
+    """The chunks of a PNG file before its texels; ValueError if one is damaged."""
 
     def __init__(self, path: Path) -> None:
         self._chunks: dict[bytes, bytes] = {}
@@ -103,10 +92,7 @@ def png_chunk(name: bytes, data: bytes) -> bytes:
 def replace_chunks(path: Path, chunks: bytes) -> None:
     """Give a PNG file these chunks instead of those between its header and its texels.
 
-    Raises
-    ------
-    OSError
-        If it is not whole, of which OpenImageIO says nothing where the disk is full.
+    OSError if it is not whole, of which OpenImageIO says nothing where the disk is full.
     """
     content = path.read_bytes()
     texels, end = 0, 8
@@ -122,10 +108,7 @@ def replace_chunks(path: Path, chunks: bytes) -> None:
 def check_tga(path: Path, texels: int) -> None:
     """Check that an uncompressed TGA of so many bytes is whole.
 
-    Raises
-    ------
-    OSError
-        If it is not, of which OpenImageIO says nothing where the disk is full.
+    OSError if not, of which OpenImageIO says nothing where the disk is full.
     """
     content = path.read_bytes()
     if len(content) < texels or not content.endswith(_TGA_END):
@@ -135,12 +118,8 @@ def check_tga(path: Path, texels: int) -> None:
 def tiff_reason(path: Path) -> Reason | None:
     """Return why a TIFF is no texture, and what helps; None if it is one.
 
-    libtiff takes what follows in the file for rows that lack, so these are looked for.
-
-    Raises
-    ------
-    ValueError
-        If the file is damaged.
+    libtiff takes what follows in the file for rows that lack, so these are looked for: ValueError
+    if they do, or if the directory is damaged.
     """
     try:
         tags = _tiff_tags(path)

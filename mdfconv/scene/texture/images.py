@@ -55,19 +55,9 @@ _GREY = ("y", "l", "grey", "gray")
 def find_channels(picture: Picture, chosen: str | None) -> tuple[int, ...]:
     """Return which channels of a picture are to be converted.
 
-    Parameters
-    ----------
-    picture : Picture
-        The picture.
-    chosen : str or None
-        One name, several with commas between, or letters that are names each, as ``"rgb"``;
-        None for the only one. Case does not matter where it does not tell two apart, and grey
-        has several names.
-
-    Raises
-    ------
-    MdfconvError
-        If the picture has no such channel, or several and none was chosen.
+    Chosen is one name, several with commas between, or letters that are names each, as ``"rgb"``;
+    None for the only one. Case does not matter where it does not tell two apart, and grey has
+    several names.
     """
     source, names = picture.source, picture.names
     known = ", ".join(name.lower() if len(name) == 1 else name for name in names)
@@ -128,27 +118,17 @@ _ATTRIBUTES = ("XResolution", "YResolution", "ResolutionUnit", "PixelAspectRatio
 
 @dataclass(frozen=True)
 class PictureForm:
-    """A form of image files.
-
-    Parameters
-    ----------
-    name, library : str
-        Its name, and the one that OpenImageIO has for it.
-    endings : tuple of str
-        What names of such files end in.
-    signatures : tuple of bytes
-        What such files start with; none if there is nothing to tell them by.
-    bands : tuple of str
-        The channels that it holds, as in ``"RGB"``; none if it holds any.
-    reason : callable
-        Returns of a file why it is no texture, and what helps; None if it is one.
-    """
+    """A form of image files."""
 
     name: str
+    # Its name in OpenImageIO.
     library: str
     endings: tuple[str, ...]
+    # What files of it start with; none if there is nothing to tell them by.
     signatures: tuple[bytes, ...] = ()
+    # The channels that it holds; none if it holds any.
     bands: tuple[str, ...] = ()
+    # Why a file of it is no texture, if it is none.
     reason: Callable[[Path], Reason | None] = lambda _: None
 
     def __str__(self) -> str:
@@ -188,14 +168,7 @@ class PictureFile:
 def check_files(
     source: PictureFile, output: PictureFile, *, lossy: bool = False
 ) -> tuple[PictureForm, PictureForm]:
-    """Return the forms of two files, if a texture can go from one to the other.
-
-    Raises
-    ------
-    MdfconvError
-        If the source is not what its name says or no texture, if the output's name is of a form
-        that cannot hold it, or if both are the same file.
-    """
+    """Return the forms of two files; refuse those between which no texture can go."""
     form = _form_of(source)
     output_form = _form_named(output.path)
     if form is JPEG and not lossy:
@@ -238,16 +211,8 @@ def _form_of(source: PictureFile) -> PictureForm:
 class Picture:
     """An open picture that is read some rows at a time.
 
-    Parameters
-    ----------
-    source : PictureFile
-        The file.
-    form : PictureForm
-        What it holds.
-    file : OpenImageIO.ImageInput
-        The same, open.
-    upright : bool
-        Whether its orientation is to be applied, not kept: the rows come as they are looked at.
+    If it is to be upright its orientation is applied, not kept: the rows come as they are looked
+    at.
     """
 
     def __init__(self, source: PictureFile, form: PictureForm, file: Any, *, upright: bool) -> None:
@@ -264,13 +229,7 @@ class Picture:
             self.width, self.height = self.height, self.width
 
     def dtype_of(self, channels: Sequence[int]) -> np.dtype[Any]:
-        """Return the type of the texels of some channels.
-
-        Raises
-        ------
-        MdfconvError
-            If they are of several types, or of one that no texture has.
-        """
+        """Return the type of the texels of some channels, which must have the same."""
         for channel in channels:
             if self.kinds[channel] not in _DTYPES:
                 raise MdfconvError(
@@ -355,13 +314,7 @@ class Picture:
 def open_picture(
     source: PictureFile, form: PictureForm, *, lossy: bool, max_pixels: int | None, upright: bool
 ) -> Iterator[Picture]:
-    """Open a picture.
-
-    Raises
-    ------
-    MdfconvError
-        If it is damaged, too large, or of a kind whose values are no roughness.
-    """
+    """Open a picture; refuse what is damaged, too large, or of a kind that is no roughness."""
     import OpenImageIO
 
     config = OpenImageIO.ImageSpec()
@@ -448,13 +401,7 @@ def reading(source: PictureFile) -> Iterator[None]:
 
 
 def check_output(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> None:
-    """Refuse a form that cannot hold what a picture becomes.
-
-    Raises
-    ------
-    MdfconvError
-        If it cannot.
-    """
+    """Refuse a form that cannot hold what a picture becomes."""
     if form in (TIFF, EXR):
         return
     if dtype.kind == "f":
@@ -472,13 +419,7 @@ def check_output(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> N
 def written(
     path: Path, form: PictureForm, picture: Picture, dtype: np.dtype[Any]
 ) -> Iterator[Callable[[NDArray[Any]], None]]:
-    """Give what takes the rows of a converted picture, for a file that is there and empty.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Give what takes the rows of a converted picture, for a file that is there and empty."""
     import OpenImageIO
 
     with reading(picture.source):  # whose texts may be none

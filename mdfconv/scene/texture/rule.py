@@ -160,11 +160,6 @@ class ValueConverter:
     roughest values. Where the method has no answer, a surface rougher than any that has one takes
     the answer of the roughest, one that is smoother is a mirror. Results are clamped to 0..1.
     NaN stays NaN.
-
-    Raises
-    ------
-    MdfconvError
-        If a name is unknown, or the method does not cover the pair or the metric.
     """
 
     def __init__(self, rule: TextureRule) -> None:

@@ -26,11 +26,6 @@ class ErrorDiffusion:
     right below. It is at most half a level, and only what leaves the picture is lost: the sums
     before and after differ by at most half a level for each texel of the last row and the two
     edges.
-
-    Parameters
-    ----------
-    width : int
-        Texels a row.
     """
 
     def __init__(self, width: int) -> None:
@@ -39,17 +34,7 @@ class ErrorDiffusion:
         self._above = np.zeros(width + 2, np.float32)
 
     def __call__(self, levels: NDArray[np.float32]) -> NDArray[np.uint8]:
-        """Round the next rows of a picture.
-
-        Parameters
-        ----------
-        levels : numpy.ndarray of float32, shape (rows, width)
-            Values in units of the level, from 0 to 255.
-
-        Returns
-        -------
-        numpy.ndarray of uint8, shape (rows, width)
-        """
+        """Round the next rows of a picture, in units of the level from 0 to 255."""
         if levels.size == 0:
             return levels.astype(np.uint8)
         step = max(_ROWS, self._width)
@@ -100,22 +85,7 @@ _TYPES = (*_TABLED, np.dtype(np.float32), np.dtype(np.float64))
 
 
 def result_type(dtype: np.dtype[Any], depth: int | None, dither: bool) -> np.dtype[Any]:
-    """Return the type of the converted texels.
-
-    Parameters
-    ----------
-    dtype : numpy.dtype
-        That of the texture.
-    depth : int or None
-        Bits of an integer texel, 8 or 16; None keeps the type.
-    dither : bool
-        Whether the errors of rounding are to be diffused.
-
-    Raises
-    ------
-    MdfconvError
-        If it is no type of a texture, or cannot have the depth or be dithered.
-    """
+    """Return the type of the converted texels, of so many bits; None keeps that of a texture."""
     native = dtype.newbyteorder("=")
     if native not in _TYPES:
         names = ", ".join(known.name for known in _TYPES)
@@ -235,23 +205,7 @@ class _ValueTable:
 class TexelMap:
     """A rule on texels of one type; integers and halves go through a table.
 
-    Parameters
-    ----------
-    rule : TextureRule
-        What to convert, and how.
-    dtype : numpy.dtype
-        Type of the texels.
-    depth : int or None
-        Bits of the result, 8 or 16; None keeps the type.
-    width : int or None
-        Texels a row, to diffuse the errors of rounding; None rounds each texel for itself.
-    channels : int
-        How many channels are converted, whose errors do not mix.
-
-    Raises
-    ------
-    MdfconvError
-        If the rule or the type cannot be converted.
+    With the width of a row the errors of rounding are diffused, in each channel by themselves.
     """
 
     def __init__(

@@ -115,16 +115,15 @@ def command(
     mdfconv gltf lamp.gltf -o new.gltf --from blinn-phong:assimp-gltf --specular 0.5 --compare
     """
     from mdfconv.distributions.endpoint import with_specular
-    from mdfconv.scene.gltf.asset import convert_gltf
-    from mdfconv.scene.gltf.factors import factor_endpoints
+    from mdfconv.scene.gltf.asset import convert_gltf, factor_endpoints
     from mdfconv.scene.gltf.images import GltfTextures
     from mdfconv.scene.shininess import ROUGHNESS, SHININESS
     from mdfconv.scene.stored import ProblemKind
 
     if guess:
-        given = [option.name for option in context.command.params if option.name]
-        ignored = set(given) - {"files", "guess"}
-        refuse_given(context, ignored, "does not go with --guess, which only proposes --from")
+        others = {option.name for option in context.command.params if option.name}
+        others -= {"files", "guess"}
+        refuse_given(context, others, "does not go with --guess, which only proposes --from")
         _propose(files)
         return
     if not textures:
@@ -137,18 +136,18 @@ def command(
     chosen = chosen_metric(metric, exposure)
     names = with_specular(source, target or ROUGHNESS, specular)
     # A mistake in the names is none of a file.
-    ends = factor_endpoints(*names)
-    if compare and ends[0].distribution.name != SHININESS:
-        raise MdfconvError(f"--compare is about exponents, {ends[0].label} stores none")
+    pair = factor_endpoints(*names)
+    if compare and pair[0].distribution.name != SHININESS:
+        raise MdfconvError(f"--compare is about exponents, {pair[0].label} stores none")
 
     def convert(destination: Destination, data: bytes) -> GltfConversion:
         _check_form(destination, data)
         folders = GltfTextures(destination.source.parent, destination.output.parent, lossy)
         with about(destination.source):
             conversion = convert_gltf(
-                data, *ends, metric=chosen, textures=folders if textures else None
+                data, *pair, metric=chosen, textures=folders if textures else None
             )
-        _tell_other_generator(destination.source, conversion.generator, ends[0])
+        _tell_other_generator(destination.source, conversion.generator, pair[0])
         return conversion
 
     report = MaterialReport(
@@ -170,7 +169,7 @@ def command(
 
 def _check_form(destination: Destination, data: bytes) -> None:
     """Refuse a name that says of a file that it is of the other form, which it does not become."""
-    from mdfconv.scene.gltf.container import is_glb
+    from mdfconv.scene.gltf.document import is_glb
 
     form = ".glb" if is_glb(data) else ".gltf"
     named = destination.output.suffix.lower()

@@ -114,7 +114,8 @@ class TextureFolder:
         if (source, rule) not in self._converted:
             stem = f"{source.stem}_{suffix}"
             output = free_name(self._output, stem, source.suffix, self.files)
-            self.files[output] = convert_texture_bytes(read_file(source), source.suffix, rule)
+            content, _ = convert_texture_bytes(read_file(source), source.suffix, rule)
+            self.files[output] = content
             self._converted[source, rule] = output
         return self._converted[source, rule].name
 

@@ -15,7 +15,6 @@ from mdfconv.conversion.methods import Method, default_method
 from mdfconv.distributions.endpoint import Endpoint
 from mdfconv.distributions.equivalence import exact_route, follow
 from mdfconv.distributions.evaluation import Array, Mask
-from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.solve import errors_of_many
@@ -44,62 +43,33 @@ class Outcome(IntEnum):
 
 
 class StoredResults(NamedTuple):
-    """Conversions of stored numbers, all in the same shape.
+    """Conversions of stored numbers, all in the same shape."""
 
-    Parameters
-    ----------
-    parameter : numpy.ndarray
-        What the source means by each; NaN where it means none.
-    result : numpy.ndarray
-        What the target stores, or would where the outcome is BEYOND; NaN where there is nothing.
-    outcome : numpy.ndarray of uint8
-        As `Outcome`.
-    """
-
+    # What the source means by each; NaN where it means none.
     parameter: Array
+    # What the target stores, or would where the outcome is BEYOND; NaN where there is nothing.
     result: Array
+    # As `Outcome`.
     outcome: NDArray[np.uint8]
 
 
 class ConvertedNumber(NamedTuple):
-    """A stored number and its conversion, as `StoredResults`.
-
-    Parameters
-    ----------
-    stored, parameter, result : float
-        The number, what is meant by it, and what it becomes.
-    outcome : Outcome
-        Which of them there are.
-    rmse : float
-        The relative root mean square of `remaining_error`; 0 of a mirror, NaN of a uniform lobe,
-        of which there is no relative error, and where there is no result.
-    """
+    """A stored number and its conversion, as `StoredResults`."""
 
     stored: float
     parameter: float
     result: float
     outcome: Outcome
+    # The relative root mean square of `remaining_error`; 0 of a mirror, NaN where there is no
+    # result and of a uniform lobe, of which there is no relative error.
     rmse: float
 
 
 class StoredConverter:
     """A conversion of the numbers that files store.
 
-    Parameters
-    ----------
-    source, target : Endpoint
-        What the numbers are, and what they become.
-    metric : Metric
-        What the fit keeps, and under which errors are taken.
-    method : Method, optional
-        The fit if not given.
-    uniform_below : float
-        Exponents below it are those of a uniform lobe, as 0 is.
-
-    Raises
-    ------
-    MdfconvError
-        If the method does not cover the pair under the metric.
+    The method is the fit if none is given, the metric also that of the errors. Exponents below a
+    limit are those of a uniform lobe, as 0 is.
     """
 
     def __init__(
@@ -171,23 +141,21 @@ class StoredConverter:
         lobes = self.target.decode_legal(result)
         known = ~np.isnan(parameter) & ~np.isnan(lobes)
         rmse = np.full(lobes.shape, np.nan)
-        ends = self._pair[0], parameter[known], self._pair[1], lobes[known]
-        rmse[known], _ = remaining_error(*ends, self.metric)
+        source, target = self._pair
+        rmse[known], _ = remaining_error(
+            source, parameter[known], target, lobes[known], self.metric
+        )
         return rmse
 
     def refusal(self, number: ConvertedNumber) -> str:
         """Return why a number has no conversion, in words."""
-        if number.outcome in (Outcome.UNANSWERED, Outcome.BEYOND):
-            parameter = np.array([number.parameter])
-            ends = self.source, self.target
-            results = self._parameters(parameter)
-            return unreachable(self.method, self.metric, parameter, results, 0, *ends).reason
         try:
-            self.source.decode(number.stored)
+            parameter = self.source.decode([number.stored])
         except MdfconvError as error:
             return str(error)
-        symbol = self.source.stored.symbol
-        return f"{self.source.label} {symbol} = {number_text(number.stored)} has no answer"
+        results = self._parameters(parameter)
+        pair = self.source, self.target
+        return unreachable(self.method, self.metric, parameter, results, 0, *pair).reason
 
     def _outcome_of_illegal(self, stored: Array) -> NDArray[np.uint8]:
         """Return what becomes of numbers that are no legal parameter."""

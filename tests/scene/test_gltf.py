@@ -20,6 +20,7 @@ from mdfconv.scene import GltfTextures, convert_gltf
 from mdfconv.scene.gltf.asset import dialects_by_generator, generator_of
 from mdfconv.scene.stored import ProblemKind
 from tests.cli.runner import run, run_on_terminal
+from tests.scene.pictures import write_png
 
 pygltflib = pytest.importorskip("pygltflib")
 
@@ -414,6 +415,26 @@ def test_a_texture_in_a_file(tmp_path):
     assert found.data == data.replace(b"maps/wood%201.png", b"wood_1_ggx-roughness.png")
     assert [entry.notes for entry in found.materials] == [("with the texture of images[0]",)] * 2
     assert found.inputs == (source / "maps" / "wood 1.png",)
+
+
+def test_a_note_on_a_texture_has_no_path_of_a_temporary_file(tmp_path):
+    texels = np.full((4, 4, 3), 99, np.uint8)
+    gamma = b"gAMA", (45455).to_bytes(4)
+    content = write_png(tmp_path / "a.png", texels, more=[gamma]).read_bytes()
+    data = text_of(textured(0), textures=[{"source": 0}], images=[{"uri": data_uri(content)}])
+    found = convert_gltf(data, OBJ2GLTF, textures=GltfTextures(tmp_path, tmp_path))
+    assert found.materials[0].notes == (
+        "with the texture of images[0]",
+        "the texture has a gamma of 2.2, which is not for data: its texels were taken as they are",
+    )
+
+
+def test_what_is_no_factor_is_refused_without_a_word_of_the_command_line():
+    for argument, pair in (("source", ("blinn-phong",)), ("target", ("ggx", "blinn-phong"))):
+        with pytest.raises(MdfconvError, match="at most 1, blinn-phong is more") as caught:
+            convert_gltf(text_of(), *pair)
+        assert "--" not in str(caught.value)
+        assert caught.value.argument == argument
 
 
 def test_textures_with_factors_and_other_uses(tmp_path):

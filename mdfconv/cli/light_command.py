@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,9 +12,6 @@ from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import console, form_of, write_table
 from mdfconv.output.records import csv_text, json_text
-
-if TYPE_CHECKING:
-    from mdfconv.scene.light import LightReport
 
 _ROUGHNESSES = (0.05, 0.1, 0.2, 0.4)
 
@@ -55,31 +52,23 @@ def command(
     mdfconv convert --from beckmann --to ggx --metric light:studio.exr 0.2
     """
     from mdfconv.output.files import file_bytes
-    from mdfconv.scene.light import light_report
+    from mdfconv.scene.light import draw_spectrum, light_report
 
     outputs = Outputs(png, spectrum, force=force, inputs=[map_])
     report = light_report(map_, m_b or _ROUGHNESSES)
+    rows, degrees = report.conversions, report.spectrum_rows()
     contents: dict[Path, bytes] = {}
     if spectrum:
-        rows = report.spectrum_rows()
-        contents[spectrum] = file_bytes(csv_text(list(rows[0]), rows))
+        contents[spectrum] = file_bytes(csv_text(list(degrees[0]), degrees))
     if png:
-        from mdfconv.scene.light import draw_spectrum
-
         contents[png] = draw_spectrum(report.spectrum, map_.name)
     outputs.write(contents)
-    _write(report, map_, form_of(format_))
-
-
-def _write(report: LightReport, path: Path, form: Format) -> None:
-    rows = report.conversions
+    form = form_of(format_)
     if form is Format.json:
         light = {"exponent": report.spectrum.exponent, "softness": report.softness}
-        answers = {"conversions": rows, "spectrum": report.spectrum_rows()}
-        typer.echo(json_text({"map": str(path), **light, **answers}))
+        lists = {"conversions": rows, "spectrum": degrees}
+        typer.echo(json_text({"map": str(map_), **light, **lists}))
         return
     write_table(list(rows[0]), rows, form, title="α of the best GGX for Beckmann's m_B")
-    if form is Format.table:
-        console().print(report.sentence)
-    else:
-        tell(report.sentence)
+    say = console().print if form is Format.table else tell
+    say(report.sentence)

@@ -24,6 +24,7 @@ from mdfconv.scene.shininess import (
     importer_results,
     roughness_of,
 )
+from mdfconv.scene.stored import ProblemKind
 from tests.cli.runner import run, run_on_terminal
 
 DATA = Path(__file__).parent / "data"
@@ -138,7 +139,7 @@ def test_what_is_not_a_number_is_reported_and_left(statement, text):
     data = b"newmtl a\n" + statement + b"\n"
     found = convert_mtl(data)
     assert found.data == data
-    assert found.problems == ((2, text),)
+    assert found.problems == ((2, text, ProblemKind.OTHER),)
     assert not found.materials
 
 
@@ -152,7 +153,7 @@ def test_ends_of_the_range():
     assert tiny.roughness == 1.0
     back = convert_mtl(b"newmtl a\nPr 0\nnewmtl b\nPr 1\nnewmtl c\nPr 1.5\n", "shininess")
     assert back.data == b"newmtl a\nPr 0\nnewmtl b\nPr 1\nNs 0\nnewmtl c\nPr 1.5\n"
-    assert back.problems == ((6, "Pr '1.5' is outside 0 ≤ Pr ≤ 1"),)
+    assert back.problems == ((6, "Pr '1.5' is outside 0 ≤ Pr ≤ 1", ProblemKind.OTHER),)
 
 
 @settings(deadline=None)
@@ -386,15 +387,15 @@ def test_the_inverse_answers_beyond_what_libraries_hold():
 def test_importers_are_compared_as_data():
     exponents, metric = np.array([1.0, 100.0, 2000.0]), metric_named("energy")
     results = importer_results(exponents, metric)
-    assert [[result.importer for result in row] for row in results] == [list(IMPORTERS)] * 3
-    by_name = {result.importer: result.roughness for result in results[1]}
+    assert [list(row) for row in results] == [list(IMPORTERS)] * 3
+    by_name = {importer: result.roughness for importer, result in results[1].items()}
     wanted = {"obj2gltf": 0.9, "blender-obj": 1 - 0.1**0.5, "fbx": 0, "unity-fbx": 0}
     assert {name: by_name[name] for name in wanted} == pytest.approx(wanted)
     for row, exponent in zip(results, exponents, strict=True):
-        for result in row:
+        for result in row.values():
             alone = error_of(np.array([exponent]), np.array([result.roughness]), metric)
             assert result.rmse == pytest.approx(alone[0], rel=1e-12)
-    assert math.isinf(results[2][0].rmse)
+    assert math.isinf(next(iter(results[2].values())).rmse)
 
 
 def test_textures_are_converted_beside_the_result(tmp_path):
@@ -531,7 +532,7 @@ def test_no_highlight_is_no_error(metric):
     """Ns 0 and Pr 1 are one lobe, the uniform one."""
     exponents = np.array([0.0, 1e-9, 1.0])
     assert fit_error(exponents, metric_named(metric))[:2].tolist() == [0, 0]
-    for result in importer_results(exponents[:1], metric_named(metric))[0]:
+    for result in importer_results(exponents[:1], metric_named(metric))[0].values():
         assert (result.roughness, result.rmse) == (1, 0)
 
 

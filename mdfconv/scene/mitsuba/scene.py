@@ -9,20 +9,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from mdfconv.errors import MdfconvError
-from mdfconv.scene.mitsuba.xml_edit import (
-    Element,
-    Lines,
-    apply_edits,
-    attribute_text,
-    children_insertion,
-    read_elements,
-    value_place,
-)
+from mdfconv.scene.mitsuba.xml_edit import Element, read_elements
 
 # What Mitsuba's distributions are here. Those of 0.6 have an exponent for an α.
 _EXPONENT = "blinn-phong:mitsuba-phong"
@@ -32,7 +24,7 @@ DEFAULT_DISTRIBUTION, DEFAULT_ALPHA = "beckmann", 0.1
 # The plugin phong of 0.6, which has no microfacets: the exponent is of the reflected ray.
 PHONG, PHONG_EXPONENT, _DEFAULT_EXPONENT = "phong", "blinn-phong:reflected", 30.0
 
-_MICROFACET_TYPES = {"roughconductor", "roughdielectric", "roughplastic", "roughcoating"}
+_TYPES = {"roughconductor", "roughdielectric", "roughplastic", "roughcoating", PHONG}
 _AXES = ("alpha_u", "alpha_v")
 # By the names of 0.6, too, which Mitsuba 3 reads in older scenes.
 _PROPERTIES = {name: name for name in ("distribution", "alpha", *_AXES)} | {
@@ -100,97 +92,147 @@ class Bsdf:
     @property
     def name(self) -> str:
         """Its id, or else its type."""
-        attributes = self.element.attributes
-        return attributes.get("id") or attributes.get("type", "")
+        return self.element.get("id") or self.element.get("type")
 
     @property
     def source(self) -> str:
         """What its α or its exponent is, as `mdfconv.convert` names it."""
         return DISTRIBUTIONS.get(self.distribution, self.distribution)
 
+    @property
+    def numbers(self) -> list[float]:
+        """Its α that are no textures."""
+        return [each.value for each in self.roughness if not math.isnan(each.value)]
 
-@dataclass
+    @property
+    def textures(self) -> list[Element]:
+        """The textures of its α."""
+        return [each.holder for each in self.roughness if each.textured and each.holder is not None]
+
+
 class MitsubaScene:
     """What matters of a scene.
 
     Parameters
     ----------
+    data : bytes
+        The scene.
+
+    Attributes
+    ----------
     version : int or None
         The first number of the version, 0 for Mitsuba 0.6; None if there is none.
     bsdfs : list of Bsdf
-        Those with a roughness, in order.
+        Those with a roughness, in order; what cannot be converted has a problem.
     includes : list of Element
         What stands in other files.
     named : list of str
         All files that it names.
     uses : Counter
         How often each default or texture is used, by its element.
-    lines : Lines
-        The lines of elements.
-    """
-
-    version: int | None
-    lines: Lines
-    bsdfs: list[Bsdf] = field(default_factory=list)
-    includes: list[Element] = field(default_factory=list)
-    named: list[str] = field(default_factory=list)
-    uses: Counter[Element] = field(default_factory=Counter)
-
-
-def read_scene(data: bytes) -> MitsubaScene:
-    """Return what matters of a scene, BSDFs that cannot be converted with their problems.
 
     Raises
     ------
     MdfconvError
         As `read_elements`.
     """
-    elements = read_elements(data)
-    names = _Names(elements, parameters=b"$" in data)
-    version = re.match(r"\s*(\d{1,9})\b", elements[0].attributes.get("version", ""))
-    scene = MitsubaScene(int(version[1]) if version else None, Lines(data), uses=names.uses)
-    for element in elements:
-        if element.tag == "include":
-            scene.includes.append(element)
-            scene.named.append(element.attributes.get("filename", ""))
-        elif element.tag == "string" and element.attributes.get("name") == "filename":
-            scene.named.append(element.attributes.get("value", ""))
-        elif element.tag == "bsdf":
-            kind = element.attributes.get("type")
-            if kind in _MICROFACET_TYPES:
-                scene.bsdfs.append(_microfacet_bsdf(element, scene.version, names))
-            elif kind == PHONG:
-                scene.bsdfs.append(_phong_bsdf(element, names))
-    return scene
 
-
-class _Names:
-    """What is called by a name in a scene: parameters with defaults, and textures with ids."""
-
-    def __init__(self, elements: list[Element], *, parameters: bool) -> None:
-        # Of several defaults Mitsuba takes the first.
-        self.defaults: dict[str, Element] = {}
-        self.textures: dict[str, Element] = {}
-        textures, referred = False, Counter[str]()
+    def __init__(self, data: bytes) -> None:
+        elements = read_elements(data)
+        by_tag: defaultdict[str, list[Element]] = defaultdict(list)
         for element in elements:
-            tag = element.tag
-            if tag == "default":
-                self.defaults.setdefault(element.attributes.get("name", ""), element)
-            elif tag == "texture":
-                textures = True
-                if "id" in element.attributes:
-                    self.textures.setdefault(element.attributes["id"], element)
-            elif tag in ("ref", "alias"):
-                referred[element.attributes.get("id", "")] += 1
-        self.uses = Counter({element: referred[name] for name, element in self.textures.items()})
-        if textures:
-            self.uses.update(_properties_that_are_textures(elements))
-        if parameters:
+            by_tag[element.tag].append(element)
+        version = re.match(r"\s*(\d{1,9})\b", elements[0].get("version"))
+        self.version = int(version[1]) if version else None
+        self.includes = by_tag["include"]
+        self.named = [
+            element.get("filename" if element.tag == "include" else "value")
+            for element in elements
+            if element.tag == "include"
+            or (element.tag == "string" and element.get("name") == "filename")
+        ]
+        # Of several of one name Mitsuba takes the first.
+        self._defaults = {each.get("name"): each for each in reversed(by_tag["default"])}
+        self._textures = {
+            each.get("id"): each for each in reversed(by_tag["texture"]) if "id" in each.attributes
+        }
+        referred = Counter(each.get("id") for each in by_tag["ref"] + by_tag["alias"])
+        self.uses = Counter({each: referred[name] for name, each in self._textures.items()})
+        if by_tag["texture"]:
+            self.uses.update(_textures_that_are_properties(elements))
+        if b"$" in data:
             used = Counter(_parameters_used(elements))
-            self.uses.update({element: used[name] for name, element in self.defaults.items()})
+            self.uses.update({each: used[name] for name, each in self._defaults.items()})
+        self.bsdfs = [self._bsdf(each) for each in by_tag["bsdf"] if each.get("type") in _TYPES]
+
+    def _bsdf(self, element: Element) -> Bsdf:
+        if element.get("type") == PHONG:
+            return Bsdf(element, PHONG_EXPONENT, roughness=(self._phong_exponent(element),))
+        bsdf = Bsdf(element)
+        try:
+            alphas = _properties(element)
+            bsdf.named_by = alphas.pop("distribution", None)
+            if bsdf.named_by is not None:
+                bsdf.distribution = self._distribution(bsdf.named_by)
+            if alphas.keys() not in _ALPHAS:
+                names = " and ".join(alphas)
+                raise MdfconvError(f"{names}: neither alpha alone nor alpha_u and alpha_v")
+            bsdf.roughness = tuple([self._roughness(alphas[name]) for name in sorted(alphas)])
+            if not alphas:
+                bsdf.roughness = (Roughness(DEFAULT_ALPHA),)
+        except MdfconvError as refusal:
+            bsdf.problem = str(refusal)
+        return bsdf
+
+    def _phong_exponent(self, element: Element) -> Roughness:
+        """Return the exponent of the plugin phong, NaN if it is not a number."""
+        for child in element.children:
+            if child.get("name") == "exponent":
+                try:
+                    return Roughness(self._roughness(child).value)
+                except MdfconvError:
+                    return Roughness(math.nan)
+        return Roughness(_DEFAULT_EXPONENT)
+
+    def _distribution(self, element: Element) -> str:
+        written = element.get("value")
+        name = written.strip().lower()
+        if element.tag != "string" or name not in DISTRIBUTIONS:
+            raise MdfconvError(f"distribution '{written}' is none of {', '.join(DISTRIBUTIONS)}")
+        if name not in TARGETS and self.version:
+            raise MdfconvError(
+                f"distribution '{written}' is one of Mitsuba 0.6, not of {self.version}"
+            )
+        return name
+
+    def _roughness(self, element: Element) -> Roughness:
+        name, value = element.get("name"), element.get("value")
+        if element.tag == "texture":
+            return Roughness(math.nan, element, textured=True)
+        if element.tag == "ref":
+            identifier = element.get("id")
+            if identifier not in self._textures:
+                raise MdfconvError(
+                    f"{name} refers to '{identifier}', which is no texture in this file"
+                )
+            return Roughness(math.nan, self._textures[identifier], textured=True)
+        if element.tag != "float":
+            raise MdfconvError(f"{name} is a {element.tag}, not a float")
+        if "$" not in value:
+            return Roughness(_number(name, value), element)
+        parameter = _PARAMETER.match(value.strip())
+        if not parameter:
+            raise MdfconvError(f"{name} '{value}' is not a number")
+        default = self._defaults.get(parameter[1])
+        if default is None:
+            raise MdfconvError(
+                f"{name} is the parameter {parameter[1]}, which has no default in this file"
+            )
+        number = _number(f"the default of {parameter[1]},", default.get("value"))
+        return Roughness(number, default, parameter[1])
 
 
-def _properties_that_are_textures(elements: list[Element]) -> Iterator[Element]:
+def _textures_that_are_properties(elements: list[Element]) -> Iterator[Element]:
     """Yield the textures that stand in other objects; a scene only gives them an id."""
     for element in elements:
         if element.children and element.tag != "scene":
@@ -204,92 +246,22 @@ def _parameters_used(elements: list[Element]) -> Iterator[str]:
                 yield from _USED.findall(value)
 
 
-class _RefusalError(Exception):
-    """Why a BSDF cannot be converted."""
-
-
-def _microfacet_bsdf(element: Element, version: int | None, names: _Names) -> Bsdf:
-    bsdf = Bsdf(element)
-    try:
-        alphas = _properties(element)
-        bsdf.named_by = alphas.pop("distribution", None)
-        if bsdf.named_by is not None:
-            bsdf.distribution = _distribution(bsdf.named_by, version)
-        if alphas.keys() not in _ALPHAS:
-            given = " and ".join(alphas)
-            raise _RefusalError(f"{given}: neither alpha alone nor alpha_u and alpha_v")
-        bsdf.roughness = tuple([_roughness(alphas[name], names) for name in sorted(alphas)])
-        if not alphas:
-            bsdf.roughness = (Roughness(DEFAULT_ALPHA),)
-    except _RefusalError as refusal:
-        bsdf.problem = str(refusal)
-    return bsdf
-
-
 def _properties(bsdf: Element) -> dict[str, Element]:
     """Return the properties that make the roughness, by their names in Mitsuba 3."""
-    found: dict[str, Element] = {}
+    properties: dict[str, Element] = {}
     for child in bsdf.children:
-        name = _PROPERTIES.get(child.attributes.get("name", ""))
-        if name in found:
-            raise _RefusalError(f"{name} is given twice")
+        name = _PROPERTIES.get(child.get("name"))
+        if name in properties:
+            raise MdfconvError(f"{name} is given twice")
         if name is not None:
-            found[name] = child
-    return found
-
-
-def _distribution(element: Element, version: int | None) -> str:
-    written = element.attributes.get("value", "")
-    name = written.strip().lower()
-    if element.tag != "string" or name not in DISTRIBUTIONS:
-        raise _RefusalError(f"distribution '{written}' is none of {', '.join(DISTRIBUTIONS)}")
-    if name not in TARGETS and version is not None and version > 0:
-        raise _RefusalError(f"distribution '{written}' is one of Mitsuba 0.6, not of {version}")
-    return name
-
-
-def _roughness(element: Element, names: _Names) -> Roughness:
-    name, value = element.attributes["name"], element.attributes.get("value", "")
-    if element.tag == "texture":
-        return Roughness(math.nan, element, textured=True)
-    if element.tag == "ref":
-        identifier = element.attributes.get("id", "")
-        if identifier not in names.textures:
-            raise _RefusalError(
-                f"{name} refers to '{identifier}', which is no texture in this file"
-            )
-        return Roughness(math.nan, names.textures[identifier], textured=True)
-    if element.tag != "float":
-        raise _RefusalError(f"{name} is a {element.tag}, not a float")
-    if "$" not in value:
-        return Roughness(_number(name, value), element)
-    parameter = _PARAMETER.match(value.strip())
-    if not parameter:
-        raise _RefusalError(f"{name} '{value}' is not a number")
-    default = names.defaults.get(parameter[1])
-    if default is None:
-        raise _RefusalError(
-            f"{name} is the parameter {parameter[1]}, which has no default in this file"
-        )
-    number = _number(f"the default of {parameter[1]},", default.attributes.get("value", ""))
-    return Roughness(number, default, parameter[1])
+            properties[name] = child
+    return properties
 
 
 def _number(name: str, text: str) -> float:
     if not _NUMBER.match(text.strip()):
-        raise _RefusalError(f"{name} '{text}' is not a number")
+        raise MdfconvError(f"{name} '{text}' is not a number")
     return float(text)
-
-
-def _phong_bsdf(element: Element, names: _Names) -> Bsdf:
-    bsdf = Bsdf(element, PHONG_EXPONENT)
-    given = [child for child in element.children if child.attributes.get("name") == "exponent"]
-    try:
-        values = [_roughness(child, names).value for child in given] or [_DEFAULT_EXPONENT]
-    except _RefusalError:
-        values = [math.nan]
-    bsdf.roughness = (Roughness(values[0]),)
-    return bsdf
 
 
 def bitmap_file(texture: Element, version: int | None) -> Element:
@@ -306,17 +278,15 @@ def bitmap_file(texture: Element, version: int | None) -> Element:
     kind = texture.attributes.get("type")
     if kind != "bitmap":
         raise MdfconvError(f"alpha is a texture of type {kind}, and only bitmaps are converted")
-    properties = {child.attributes.get("name"): child for child in texture.children}
+    properties = {child.get("name"): child for child in texture.children}
     file = properties.get("filename")
-    name = "" if file is None else file.attributes.get("value", "")
+    name = file.get("value") if file else ""
     if file is None or not name or "$" in name:
         raise MdfconvError("alpha is a bitmap without a filename, or with one of a parameter")
-    values = {
-        str(key): child.attributes.get("value", "").strip().lower()
-        for key, child in properties.items()
-    }
+    values = {key: child.get("value").strip().lower() for key, child in properties.items()}
+    gamma = values.get("gamma", "")
     raw = values.get("raw") == "true" and version != 0
-    linear = _is_one(values.get("gamma", "")) and version in (0, None)
+    linear = _NUMBER.match(gamma) and float(gamma) == 1 and version in (0, None)
     if not (raw or linear or name.lower().endswith(".exr")):
         setting = 'gamma="1"' if version == 0 else 'raw="true"'
         raise MdfconvError(
@@ -325,33 +295,23 @@ def bitmap_file(texture: Element, version: int | None) -> Element:
     return file
 
 
-def _is_one(text: str) -> bool:
-    return bool(_NUMBER.match(text)) and float(text) == 1
-
-
-def leave_what_others_use(scene: MitsubaScene, target: str) -> None:
+def leave_what_others_use(scene: MitsubaScene, pending: Sequence[Bsdf]) -> None:
     """Give a problem to BSDFs whose default or texture cannot be changed for all that use it.
 
-    Parameters
-    ----------
-    scene : Scene
-        BSDFs that are left for another reason have their problem already.
-    target : str
-        The distribution that the others are to have.
+    Those that are to be converted may be left for another reason, and have a problem already.
     """
     users: dict[Element, list[tuple[Bsdf, Roughness]]] = {}
-    for bsdf in scene.bsdfs:
-        if not bsdf.problem and bsdf.distribution not in (target, PHONG_EXPONENT):
+    for bsdf in pending:
+        if not bsdf.problem:
             for roughness in bsdf.roughness:
                 if roughness.shared and roughness.holder is not None:
                     users.setdefault(roughness.holder, []).append((bsdf, roughness))
-    pending = [holder for holder, group in users.items() if _others_use(scene, holder, group)]
-    while pending:
-        holder = pending.pop()
-        for bsdf, own in users.pop(holder, []):
+    unsettled = [holder for holder, group in users.items() if _others_use(scene, holder, group)]
+    while unsettled:
+        for bsdf, roughness in users.pop(unsettled.pop(), []):
             if not bsdf.problem:
-                bsdf.problem = _shared_problem(scene, own)
-                pending += [each.holder for each in bsdf.roughness if each.holder is not None]
+                bsdf.problem = _shared_problem(scene, roughness)
+                unsettled += [each.holder for each in bsdf.roughness if each.holder is not None]
 
 
 def _others_use(scene: MitsubaScene, holder: Element, users: list[tuple[Bsdf, Roughness]]) -> bool:
@@ -366,58 +326,8 @@ def _others_use(scene: MitsubaScene, holder: Element, users: list[tuple[Bsdf, Ro
 
 def _shared_problem(scene: MitsubaScene, roughness: Roughness) -> str:
     assert roughness.holder is not None
-    name = roughness.parameter or roughness.holder.attributes.get("id", "")
+    name = roughness.parameter or roughness.holder.get("id")
     what = f"the {'parameter' if roughness.parameter else 'texture'} {name}"
     if scene.includes:
         return f"alpha is {what}, which an included file may use, too"
     return f"alpha is {what}, which is not only that of BSDFs converted alike"
-
-
-# Mitsuba computes with 24 bits, which takes nine digits to tell all apart.
-_DIGITS = 9
-
-
-class SceneEdits:
-    """The changes in the bytes of a scene.
-
-    Parameters
-    ----------
-    data : bytes
-        The scene.
-    target : str
-        The distribution that BSDFs are given.
-    """
-
-    def __init__(self, data: bytes, target: str) -> None:
-        self._data, self._target = data, target
-        self._edits: dict[int, tuple[int, bytes]] = {}
-
-    def result(self) -> bytes:
-        """Return the changed scene."""
-        return apply_edits(self._data, self._edits)
-
-    def set_file(self, element: Element, name: str) -> None:
-        """Change the attribute ``value`` to the name of another file."""
-        self._set_value(element, attribute_text(name))
-
-    def _set_value(self, element: Element, text: bytes) -> None:
-        start, end = value_place(self._data, element)
-        self._edits[start] = end, text
-
-    def convert(self, bsdf: Bsdf, results: Sequence[float]) -> None:
-        """Give a BSDF the target's distribution, and new numbers for its α; NaN of a texture."""
-        new: list[tuple[str, dict[str, str]]] = []
-        if bsdf.named_by is not None:
-            self._set_value(bsdf.named_by, self._target.encode())
-        elif self._target != DEFAULT_DISTRIBUTION:
-            new.append(("string", {"name": "distribution", "value": self._target}))
-        for each, result in zip(bsdf.roughness, results, strict=True):
-            number = f"{result:.{_DIGITS}g}"
-            if each.holder is None:
-                if result != DEFAULT_ALPHA:
-                    new.append(("float", {"name": "alpha", "value": number}))
-            elif not each.textured:
-                self._set_value(each.holder, number.encode())
-        if new:
-            start, end, text = children_insertion(self._data, bsdf.element, new)
-            self._edits[start] = end, text

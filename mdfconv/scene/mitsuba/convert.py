@@ -317,11 +317,11 @@ def _convert_bitmaps(
 
 def _material(bsdf: Bsdf, table: Mapping[float, ConvertedNumber] | None) -> MitsubaMaterial:
     """Return what a BSDF becomes; without a table it has the target's distribution already."""
-    values = [each.value for each in bsdf.roughness]
+    # Textures have no number.
+    values = [math.nan if each.value is None else each.value for each in bsdf.roughness]
     if table is None:
         results, rmse, notes = values, 0.0, [f"{bsdf.distribution} already"]
     else:
-        # Textures have no number.
         results = [table[x].result if x in table else math.nan for x in values]
         rmse = _worst([table[x].rmse if x in table else math.nan for x in values])
         parameters = [each.parameter for each in bsdf.roughness if each.parameter]
@@ -340,20 +340,20 @@ def _material(bsdf: Bsdf, table: Mapping[float, ConvertedNumber] | None) -> Mits
 
 def _edit(edits: XmlEdits, bsdf: Bsdf, target: str, results: Sequence[float]) -> None:
     """Give a BSDF the target's distribution, and new numbers for its α; NaN of a texture."""
-    new: list[tuple[str, dict[str, str]]] = []
+    new: list[tuple[str, str, str]] = []
     if bsdf.named_by is not None:
         edits.set_value(bsdf.named_by, target.encode())
     elif target != DEFAULT_DISTRIBUTION:
-        new.append(("string", {"name": "distribution", "value": target}))
+        new.append(("string", "distribution", target))
     for each, result in zip(bsdf.roughness, results, strict=True):
         number = f"{result:.{_DIGITS}g}"
         if each.holder is None:
             if result != DEFAULT_ALPHA:
-                new.append(("float", {"name": "alpha", "value": number}))
+                new.append(("float", "alpha", number))
         elif not each.textured:
             edits.set_value(each.holder, number.encode())
     if new:
-        edits.add_children(bsdf.element, new)
+        edits.add_properties(bsdf.element, new)
 
 
 def _worst(errors: Sequence[float]) -> float:

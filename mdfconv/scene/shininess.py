@@ -17,6 +17,7 @@ from mdfconv.distributions.dialects import DIALECTS, Dialect, Specular, dialects
 from mdfconv.distributions.endpoint import endpoint, endpoints
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.solve import errors_of_many
 from mdfconv.scene.stored import UNIFORM_BELOW, StoredConverter
 
 SHININESS, ROUGHNESS = "blinn-phong", "ggx:roughness"
@@ -31,10 +32,6 @@ def roughness_of(exponent: Array, metric: Metric) -> Array:
     # With the cautions of a conversion.
     roughness[lobes] = convert(exponent[lobes], SHININESS, ROUGHNESS, metric=metric)
     return roughness
-
-
-def _converter(metric: Metric) -> StoredConverter:
-    return StoredConverter(*endpoints(SHININESS, ROUGHNESS), metric)
 
 
 def exponent_of(roughness: Array, metric: Metric) -> Array:
@@ -60,7 +57,8 @@ def error_of(exponent: Array, roughness: Array, metric: Metric) -> Array:
 
     It is the relative root mean square of `remaining_error`; infinite for a mirror (Pr 0).
     """
-    rmse = _converter(metric).remaining(np.maximum(exponent, UNIFORM_BELOW), roughness)
+    converter = StoredConverter(*endpoints(SHININESS, ROUGHNESS), metric)
+    rmse = converter.remaining(np.maximum(exponent, UNIFORM_BELOW), roughness)
     rmse[roughness == 0] = np.inf
     # Both are the uniform lobe, whose signal may be nothing that an error is relative to.
     rmse[(exponent < UNIFORM_BELOW) & (roughness == 1)] = 0.0
@@ -69,9 +67,13 @@ def error_of(exponent: Array, roughness: Array, metric: Metric) -> Array:
 
 def fit_error(exponent: Array, metric: Metric) -> Array:
     """Return `error_of` the roughness that fits best, shape (n,), of many to 1e-4; NaN for NaN."""
+
+    def error(exponent: Array) -> Array:
+        return error_of(exponent, roughness_of(exponent, metric), metric)
+
     rmse = np.full_like(exponent, np.nan)
     known = ~np.isnan(exponent)
-    rmse[known] = _converter(metric).errors(np.maximum(exponent[known], UNIFORM_BELOW))
+    rmse[known] = errors_of_many(error, np.maximum(exponent[known], UNIFORM_BELOW))
     rmse[exponent < UNIFORM_BELOW] = 0.0
     return rmse
 

@@ -15,6 +15,7 @@ from mdfconv.conversion.methods import Method, default_method
 from mdfconv.distributions.endpoint import Endpoint
 from mdfconv.distributions.equivalence import exact_route, follow
 from mdfconv.distributions.evaluation import Array, Mask
+from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.solve import errors_of_many
@@ -33,7 +34,7 @@ class Outcome(IntEnum):
     UNIFORM = 2
     # The method has no legal parameter for it.
     UNANSWERED = 3
-    # The target does not store the number that it would become.
+    # The target does not store the number that it would become, or that is too large.
     BEYOND = 4
     # It is outside 0..1 in a texture.
     OUTSIDE = 5
@@ -69,7 +70,7 @@ class StoredConverter:
     """A conversion of the numbers that files store.
 
     The method is the fit if none is given, the metric also that of the errors. Exponents below a
-    limit are those of a uniform lobe, as 0 is.
+    limit are those of a uniform lobe, as 0 is; results above the largest are `Outcome.BEYOND`.
     """
 
     def __init__(
@@ -80,11 +81,12 @@ class StoredConverter:
         method: Method | None = None,
         *,
         uniform_below: float = UNIFORM_BELOW,
+        largest: float = np.inf,
     ) -> None:
         self.source, self.target, self.metric = source, target, metric
         self._pair = source.distribution, target.distribution
         self.method = method or default_method(*self._pair)
-        self._uniform_below = uniform_below
+        self._uniform_below, self._largest = uniform_below, largest
         self._exact = exact_route(*self._pair)
         if self._exact is None:
             check_covered(self.method, metric, source, target)
@@ -131,7 +133,8 @@ class StoredConverter:
         """Return the errors that remain of stored numbers, shape (n,); of many to 1e-4."""
 
         def errors(stored: Array) -> Array:
-            parameter, result, _ = self(stored)
+            parameter, result, outcome = self(stored)
+            result[outcome != Outcome.CONVERTED] = np.nan
             return self.remaining(parameter, result)
 
         return errors_of_many(errors, stored) if stored.min(initial=1) > 0 else errors(stored)
@@ -153,6 +156,9 @@ class StoredConverter:
             parameter = self.source.decode([number.stored])
         except MdfconvError as error:
             return str(error)
+        if self.target.stored.accepts(np.asarray(number.result)):
+            label, result = self.target.label, number_text(number.result)
+            return f"{label} would be {result}, above {number_text(self._largest)}"
         results = self._parameters(parameter)
         pair = self.source, self.target
         return unreachable(self.method, self.metric, parameter, results, 0, *pair).reason
@@ -196,6 +202,8 @@ class StoredConverter:
             storable: Mask = self.target.stored.accepts(result)
         if self.target.encoding:
             storable |= self.target.encoding.clamped(result)
+        if self._largest < np.inf:
+            storable &= result <= self._largest
         return storable
 
 

@@ -74,6 +74,14 @@ def test_a_refusal_is_that_of_a_single_conversion(source, target, stored, text):
     assert refusal in str(caught.value)
 
 
+def test_results_above_the_largest_have_no_error():
+    convert = converter("beckmann", "gauss", largest=1)
+    number = convert.table([0.5, 0.99])[0.99]
+    assert number.outcome is Outcome.BEYOND
+    assert np.isnan(number.rmse)
+    assert convert.refusal(number) == f"gauss would be {number.result:.10g}, above 1"
+
+
 def test_a_method_that_does_not_cover_a_pair_is_refused():
     from mdfconv.conversion.methods import method_named
 

@@ -134,7 +134,7 @@ def convert_gltf(
     else:
         problem = "has a roughness texture", ProblemKind.TEXTURE
         problems |= dict.fromkeys(textured, problem)
-    numbers, reasons, notes = _numbers(plain.values(), StoredConverter(*pair, metric))
+    numbers, reasons, notes = _numbers(plain.values(), StoredConverter(*pair, metric, largest=1))
     for at, factor in plain.items():
         if factor in reasons:
             problems[at] = reasons[factor], ProblemKind.OTHER
@@ -206,15 +206,12 @@ def _numbers(
     reasons: dict[float, str] = {}
     notes: dict[float, tuple[str, ...]] = {}
     for factor, number in numbers.items():
-        result = number_text(number.result)
         if number.outcome in _LIMITS:
             symbol = convert.source.stored.symbol
-            text = f"{symbol} = {number_text(factor)} is {_LIMITS[number.outcome]}: {result}"
-            notes[factor] = (text,)
+            text = f"{symbol} = {number_text(factor)} is {_LIMITS[number.outcome]}"
+            notes[factor] = (f"{text}: {number_text(number.result)}",)
         elif number.outcome is not Outcome.CONVERTED:
             reasons[factor] = convert.refusal(number)
-        elif number.result > 1:
-            reasons[factor] = f"{convert.target.label} would be {result}, above 1"
     converted = [each for each in numbers.values() if each.outcome is Outcome.CONVERTED]
     pair = [each.stored for each in converted], [each.result for each in converted]
     warn_of(convert.method, [pair], convert.source, convert.target, stacklevel=3)

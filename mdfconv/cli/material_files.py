@@ -201,22 +201,7 @@ def convert_files(
 ) -> None:
     """Convert files, write all or none, report, and exit with 1 if something had to be left.
 
-    Parameters
-    ----------
-    context : typer.Context
-        Of the command.
-    patterns : sequence of str
-        Names and glob patterns.
-    output : str or None
-        A file, or a folder; None in place.
-    convert : callable
-        From where a file goes, and its bytes, to its conversion.
-    report : MaterialReport
-        How what was converted is reported.
-    in_place : bool
-        Whether the files themselves change.
-    force : bool
-        Whether files that exist are replaced.
+    Without an output, a file or a folder, they are converted in place.
 
     Raises
     ------

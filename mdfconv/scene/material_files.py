@@ -33,15 +33,7 @@ class Destination:
 
 
 def choose_outputs(files: Sequence[Path], output: str | None) -> list[Destination]:
-    """Return where each file's conversion goes.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        The files.
-    output : str or None
-        A file for one of them, or a folder, as `is_folder`; None to write over the file itself
-        and keep the original beside it.
+    """Return where conversions go: into a file or a folder, or without either in place.
 
     Raises
     ------
@@ -157,13 +149,7 @@ class FileConversion:
 
 
 def read_file(path: Path) -> bytes:
-    """Return the bytes of a file.
-
-    Raises
-    ------
-    MdfconvError
-        If it cannot be read.
-    """
+    """Return the bytes of a file; raise `MdfconvError` if it cannot be read."""
     try:
         return path.read_bytes()
     except OSError as error:
@@ -175,19 +161,8 @@ def write_conversions(
 ) -> list[Destination]:
     """Write all conversions and what goes beside them, backups first, or nothing.
 
-    What a conversion in place does not change is not written.
-
-    Parameters
-    ----------
-    converted : sequence of (Destination, bytes, FileConversion)
-        For each file where it goes, its original and its conversion.
-    force : bool
-        Whether files that exist are replaced; backups never are.
-
-    Returns
-    -------
-    list of Destination
-        What was written.
+    Each has its destination and its original. What a conversion in place does not change is not
+    written; `force` replaces files that exist, but no backups. Returns what was written.
 
     Raises
     ------

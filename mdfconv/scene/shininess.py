@@ -17,6 +17,7 @@ from mdfconv.distributions.dialects import DIALECTS, Dialect, Specular, dialects
 from mdfconv.distributions.endpoint import endpoint, endpoints
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.solve import errors_of_many
 from mdfconv.scene.stored import UNIFORM_BELOW, StoredConverter
 
 SHININESS, ROUGHNESS = "blinn-phong", "ggx:roughness"
@@ -33,24 +34,10 @@ def roughness_of(exponent: Array, metric: Metric) -> Array:
     return roughness
 
 
-def _converter(metric: Metric) -> StoredConverter:
-    return StoredConverter(*endpoints(SHININESS, ROUGHNESS), metric)
-
-
 def exponent_of(roughness: Array, metric: Metric) -> Array:
-    """Return the exponent whose best GGX has a roughness: the inverse of `roughness_of`.
+    """Return the Ns whose best GGX has each Pr, shape (n,): the inverse of `roughness_of`.
 
-    Parameters
-    ----------
-    roughness : numpy.ndarray, shape (n,)
-        Pr from 0 to 1.
-    metric : Metric
-        What the fit keeps.
-
-    Returns
-    -------
-    numpy.ndarray, shape (n,)
-        Ns, 0 for Pr 1, NaN for a mirror and otherwise from 1e-6 to 1e18.
+    It is 0 for Pr 1, NaN for a mirror and otherwise from 1e-6 to 1e18.
     """
     from scipy.optimize import elementwise
 
@@ -66,21 +53,12 @@ def exponent_of(roughness: Array, metric: Metric) -> Array:
 
 
 def error_of(exponent: Array, roughness: Array, metric: Metric) -> Array:
-    """Return the error of GGX in Blinn/Phong's place.
+    """Return the error of GGX of each Pr in the place of Blinn/Phong of each Ns, shape (n,).
 
-    Parameters
-    ----------
-    exponent, roughness : numpy.ndarray, shape (n,)
-        Ns ≥ 0 and Pr from 0 to 1.
-    metric : Metric
-        Under which the error is taken.
-
-    Returns
-    -------
-    numpy.ndarray, shape (n,)
-        The relative root mean square of `remaining_error`; infinite for a mirror (Pr 0).
+    It is the relative root mean square of `remaining_error`; infinite for a mirror (Pr 0).
     """
-    rmse = _converter(metric).remaining(np.maximum(exponent, UNIFORM_BELOW), roughness)
+    converter = StoredConverter(*endpoints(SHININESS, ROUGHNESS), metric)
+    rmse = converter.remaining(np.maximum(exponent, UNIFORM_BELOW), roughness)
     rmse[roughness == 0] = np.inf
     # Both are the uniform lobe, whose signal may be nothing that an error is relative to.
     rmse[(exponent < UNIFORM_BELOW) & (roughness == 1)] = 0.0
@@ -89,9 +67,13 @@ def error_of(exponent: Array, roughness: Array, metric: Metric) -> Array:
 
 def fit_error(exponent: Array, metric: Metric) -> Array:
     """Return `error_of` the roughness that fits best, shape (n,), of many to 1e-4; NaN for NaN."""
+
+    def error(exponent: Array) -> Array:
+        return error_of(exponent, roughness_of(exponent, metric), metric)
+
     rmse = np.full_like(exponent, np.nan)
     known = ~np.isnan(exponent)
-    rmse[known] = _converter(metric).errors(np.maximum(exponent[known], UNIFORM_BELOW))
+    rmse[known] = errors_of_many(error, np.maximum(exponent[known], UNIFORM_BELOW))
     rmse[exponent < UNIFORM_BELOW] = 0.0
     return rmse
 
@@ -146,21 +128,13 @@ EXPONENTS = (10, 100, 1000)
 
 
 def encoding_records(metric: Metric) -> list[dict[str, Any]]:
-    """Return every encoding and dialect, with the error that its rule leaves.
+    """Return every encoding and dialect, with the error that its rule leaves under a metric.
 
-    Parameters
-    ----------
-    metric : Metric
-        Under which the error is taken.
-
-    Returns
-    -------
-    list of dict
-        ``encoding`` as in ``"blinn-phong:fbx"``, its ``formula``, the legal ``range`` of the
-        stored number, what is ``clamped``, the ``programs``, where their ``source`` is, a
-        ``note``, ``specular`` ("no", "optional" or "needed"), and of what stores a roughness for
-        an exponent ``roughness_100`` and ``rmse_100``, and so on for each of `EXPONENTS`: of GGX
-        in Blinn/Phong's place, with a specular weight of 1; infinite for a mirror.
+    A record has ``encoding`` as in ``"blinn-phong:fbx"``, its ``formula``, the legal ``range`` of
+    the stored number, what is ``clamped``, the ``programs``, where their ``source`` is, a
+    ``note``, ``specular`` ("no", "optional" or "needed"), and of what stores a roughness for an
+    exponent ``roughness_100`` and ``rmse_100``, and so on for each of `EXPONENTS`: of GGX in
+    Blinn/Phong's place, with a specular weight of 1; infinite for a mirror.
     """
     texts = ("encoding", "formula", "range", "clamped", "programs", "source", "note")
     columns = [f"{what}_{n}" for n in EXPONENTS for what in ImporterResult._fields]

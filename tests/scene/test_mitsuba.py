@@ -94,6 +94,23 @@ def test_every_other_byte_is_kept():
     assert all("ggx already" in each.notes for each in again.materials)
 
 
+@pytest.mark.parametrize("end", [b"\n", b"\r\n", b"\r"])
+def test_lines_are_counted_whatever_ends_them(end):
+    lines = [
+        b"\xef\xbb\xbf<scene version='0.6.0'>",
+        b"<!-- \xc3\xa9",
+        b"-->",
+        b"<bsdf type='roughplastic'",
+        b"  id='x'/>",
+        b"<bsdf type='roughplastic'><float name='alpha' value='x'/></bsdf>",
+        b"<include filename='other.xml'/></scene>",
+    ]
+    found = convert_mitsuba(end.join(lines))
+    assert [each.line for each in found.materials] == [4]
+    assert [problem.place for problem in found.problems] == [6]
+    assert found.includes == ((7, "other.xml"),)
+
+
 @pytest.mark.parametrize(
     ("before", "after"),
     [

@@ -158,11 +158,8 @@ def convert_mitsuba(
     metric = metric_named(metric)
     scene = MitsubaScene(data)
     pending = [bsdf for bsdf in scene.bsdfs if not bsdf.problem and bsdf.distribution != target]
-    numbers = _grouped((bsdf.source, bsdf.numbers) for bsdf in pending)
-    tables = {
-        source: _Numbers(source, values, target, metric).table()
-        for source, values in numbers.items()
-    }
+    numbers = _numbers(((bsdf.source, bsdf.numbers) for bsdf in pending), target, metric)
+    tables = {source: each.table() for source, each in numbers.items()}
     for bsdf in pending:
         bsdf.problem = _number_problem(bsdf, tables[bsdf.source], target)
     leave_what_others_use(scene, pending)
@@ -176,9 +173,9 @@ def convert_mitsuba(
         if bsdf.problem:
             continue
         if bsdf.distribution == target:
-            materials.append(_left(bsdf, target))
+            materials.append(_material(bsdf, None))
             continue
-        materials.append(_converted(bsdf, tables[bsdf.source]))
+        materials.append(_material(bsdf, tables[bsdf.source]))
         _edit(edits, bsdf, target, _axes(materials[-1].result))
         for holder in bsdf.textures:
             textures[holder] = bitmaps[holder]
@@ -214,12 +211,9 @@ def unchanged_errors(
 
     As `MitsubaMaterial.rmse`; NaN also where the target has no such α.
     """
-    numbers = _grouped((each.distribution, _axes(each.value)) for each in materials)
-    tables = {
-        name: _Numbers(DISTRIBUTIONS[name], values, target, metric).unchanged_errors()
-        for name, values in numbers.items()
-        if name != target
-    }
+    changed = [each for each in materials if each.distribution != target]
+    numbers = _numbers(((x.distribution, _axes(x.value)) for x in changed), target, metric)
+    tables = {name: each.unchanged_errors() for name, each in numbers.items()}
     return [
         0.0
         if each.distribution == target
@@ -228,12 +222,17 @@ def unchanged_errors(
     ]
 
 
-def _grouped(numbers: Iterable[tuple[str, Sequence[float]]]) -> dict[str, set[float]]:
-    """Return all numbers by the names that stand before them; without NaN, that of a texture."""
+def _numbers(
+    values: Iterable[tuple[str, Sequence[float]]], target: str, metric: Metric
+) -> dict[str, _Numbers]:
+    """Return all numbers of each distribution; NaN is that of a texture."""
     groups: dict[str, set[float]] = {}
-    for name, values in numbers:
-        groups.setdefault(name, set()).update(x for x in values if not math.isnan(x))
-    return groups
+    for name, numbers in values:
+        groups.setdefault(name, set()).update(x for x in numbers if not math.isnan(x))
+    return {
+        name: _Numbers(DISTRIBUTIONS.get(name, name), numbers, target, metric)
+        for name, numbers in groups.items()
+    }
 
 
 class _Numbers:
@@ -274,12 +273,11 @@ def _number_problem(bsdf: Bsdf, table: Mapping[float, ConvertedNumber], target: 
     for value in bsdf.numbers:
         number = table.get(value)
         if number is None or number.outcome is not Outcome.CONVERTED:
-            what = f"alpha {value:g} of {bsdf.distribution}"
             if value == 0:
-                return f"{what} is a mirror"
-            return (
-                f"{what} is out of range" if number is None else f"{what} has no answer in {target}"
-            )
+                why = "is a mirror"
+            else:
+                why = "is out of range" if number is None else f"has no answer in {target}"
+            return f"alpha {value:g} of {bsdf.distribution} {why}"
     return ""
 
 
@@ -317,25 +315,18 @@ def _convert_bitmaps(
     return bitmaps
 
 
-def _left(bsdf: Bsdf, target: str) -> MitsubaMaterial:
-    """Return a BSDF that has the target's distribution already."""
-    value = _value([each.value for each in bsdf.roughness])
-    notes = [f"{target} already"]
-    notes += ["default α" for each in bsdf.roughness if each.holder is None]
-    return MitsubaMaterial(bsdf.name, bsdf.element.line, target, value, value, 0.0, tuple(notes))
-
-
-def _converted(bsdf: Bsdf, table: Mapping[float, ConvertedNumber]) -> MitsubaMaterial:
-    values = [each.value for each in bsdf.roughness]
+def _material(bsdf: Bsdf, table: Mapping[float, ConvertedNumber] | None) -> MitsubaMaterial:
+    """Return what a BSDF becomes; without a table it has the target's distribution already."""
     # Textures have no number.
-    results = [table[x].result if x in table else math.nan for x in values]
-    rmse = _worst([table[x].rmse if x in table else math.nan for x in values])
-    notes = []
-    for each in bsdf.roughness:
-        if each.parameter:
-            notes.append(f"parameter {each.parameter}: convert what -D gives it, too")
-        elif each.holder is None:
-            notes.append("default α")
+    values = [math.nan if each.value is None else each.value for each in bsdf.roughness]
+    if table is None:
+        results, rmse, notes = values, 0.0, [f"{bsdf.distribution} already"]
+    else:
+        results = [table[x].result if x in table else math.nan for x in values]
+        rmse = _worst([table[x].rmse if x in table else math.nan for x in values])
+        parameters = [each.parameter for each in bsdf.roughness if each.parameter]
+        notes = [f"parameter {x}: convert what -D gives it, too" for x in parameters]
+    notes += ["default α" for each in bsdf.roughness if each.holder is None]
     return MitsubaMaterial(
         bsdf.name,
         bsdf.element.line,
@@ -349,20 +340,20 @@ def _converted(bsdf: Bsdf, table: Mapping[float, ConvertedNumber]) -> MitsubaMat
 
 def _edit(edits: XmlEdits, bsdf: Bsdf, target: str, results: Sequence[float]) -> None:
     """Give a BSDF the target's distribution, and new numbers for its α; NaN of a texture."""
-    new: list[tuple[str, dict[str, str]]] = []
+    new: list[tuple[str, str, str]] = []
     if bsdf.named_by is not None:
         edits.set_value(bsdf.named_by, target.encode())
     elif target != DEFAULT_DISTRIBUTION:
-        new.append(("string", {"name": "distribution", "value": target}))
+        new.append(("string", "distribution", target))
     for each, result in zip(bsdf.roughness, results, strict=True):
         number = f"{result:.{_DIGITS}g}"
         if each.holder is None:
             if result != DEFAULT_ALPHA:
-                new.append(("float", {"name": "alpha", "value": number}))
+                new.append(("float", "alpha", number))
         elif not each.textured:
             edits.set_value(each.holder, number.encode())
     if new:
-        edits.add_children(bsdf.element, new)
+        edits.add_properties(bsdf.element, new)
 
 
 def _worst(errors: Sequence[float]) -> float:

@@ -7,7 +7,6 @@ or both ``alpha_u`` and ``alpha_v`` (0.6: ``alphaU`` and ``alphaV``).
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
@@ -43,8 +42,8 @@ class Roughness:
 
     Parameters
     ----------
-    value : float
-        The number; NaN of a texture.
+    value : float or None
+        The number; None of a texture, and of an exponent that is not a number.
     holder : Element or None
         What would be changed: the property, the default of a parameter, or the texture; None
         where the α is not given.
@@ -54,7 +53,7 @@ class Roughness:
         Whether the holder is a texture.
     """
 
-    value: float
+    value: float | None
     holder: Element | None = None
     parameter: str = ""
     textured: bool = False
@@ -102,7 +101,7 @@ class Bsdf:
     @property
     def numbers(self) -> list[float]:
         """Its α that are no textures."""
-        return [each.value for each in self.roughness if not math.isnan(each.value)]
+        return [each.value for each in self.roughness if each.value is not None]
 
     @property
     def textures(self) -> list[Element]:
@@ -185,13 +184,13 @@ class MitsubaScene:
         return bsdf
 
     def _phong_exponent(self, element: Element) -> Roughness:
-        """Return the exponent of the plugin phong, NaN if it is not a number."""
+        """Return the exponent of the plugin phong."""
         for child in element.children:
             if child.get("name") == "exponent":
                 try:
                     return Roughness(self._roughness(child).value)
                 except MdfconvError:
-                    return Roughness(math.nan)
+                    return Roughness(None)
         return Roughness(_DEFAULT_EXPONENT)
 
     def _distribution(self, element: Element) -> str:
@@ -208,14 +207,14 @@ class MitsubaScene:
     def _roughness(self, element: Element) -> Roughness:
         name, value = element.get("name"), element.get("value")
         if element.tag == "texture":
-            return Roughness(math.nan, element, textured=True)
+            return Roughness(None, element, textured=True)
         if element.tag == "ref":
             identifier = element.get("id")
             if identifier not in self._textures:
                 raise MdfconvError(
                     f"{name} refers to '{identifier}', which is no texture in this file"
                 )
-            return Roughness(math.nan, self._textures[identifier], textured=True)
+            return Roughness(None, self._textures[identifier], textured=True)
         if element.tag != "float":
             raise MdfconvError(f"{name} is a {element.tag}, not a float")
         if "$" not in value:

@@ -141,8 +141,8 @@ class XmlEdits:
         start, end = start + len(old) - len(old.lstrip()), end - len(old) + len(old.rstrip())
         self._edits[start] = end, text
 
-    def add_children(self, element: Element, children: list[tuple[str, dict[str, str]]]) -> None:
-        """Put empty elements, tags with attributes, before the children of an element.
+    def add_properties(self, element: Element, properties: list[tuple[str, str, str]]) -> None:
+        """Put properties, of a tag, a name and a value, before the children of an element.
 
         They stand as its first child does, or if it has none a step further in than itself, and
         have its quotes.
@@ -160,7 +160,10 @@ class XmlEdits:
                 closing = b""
         quoted = _QUOTE.match(tag[0])
         quote = quoted[1] if quoted else b'"'
-        inner = b"".join(gap + _empty_element(*child, quote, ending) for child in children)
+        inner = b""
+        for kind, *texts in properties:
+            name, value = (quote + attribute_text(text) + quote for text in texts)
+            inner += gap + b"<%b name=%b value=%b%b" % (kind.encode(), name, value, ending)
         inner += closing
         if tag[2]:
             start, end = tag.span(1)
@@ -191,11 +194,3 @@ class XmlEdits:
             return b"\t"
         first = _INDENTATION.search(self._data, 0, _FIRST_LINES)
         return first[1] if first else b"    "
-
-
-def _empty_element(tag: str, attributes: dict[str, str], quote: bytes, end: bytes) -> bytes:
-    pairs = [
-        b" " + name.encode() + b"=" + quote + attribute_text(value) + quote
-        for name, value in attributes.items()
-    ]
-    return b"<" + tag.encode() + b"".join(pairs) + end

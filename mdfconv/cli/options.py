@@ -14,7 +14,7 @@ from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
-    from mdfconv.conversion.arrays import Gamma
+    from mdfconv.conversion.values import Gamma
     from mdfconv.fitting.metrics import Metric
 
 # Of a page a hundred million pixels, a third of a gigabyte.
@@ -222,7 +222,7 @@ def chosen_gamma(text: str | None) -> Gamma:
     MdfconvError
         If it is something else.
     """
-    from mdfconv.conversion.arrays import FREE
+    from mdfconv.conversion.values import FREE
 
     if text is None:
         return None

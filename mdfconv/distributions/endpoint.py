@@ -1,7 +1,11 @@
-"""One end of a conversion: a distribution and the encoding of its parameter."""
+"""The ends of a conversion: a distribution, and the form in which its parameter is stored.
+
+Here are the look-up of both by name, and the exact relations between two distributions.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -9,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdfconv.distributions import Distribution, distribution, one_parameter_distribution
-from mdfconv.distributions.dialects import DIALECTS, Specular, dialects_of
+from mdfconv.distributions.dialects import DIALECTS, Dialect, Specular, dialects_of
 from mdfconv.distributions.evaluation import Array, Mask
-from mdfconv.distributions.parameter import Encoding, Parameter
+from mdfconv.distributions.parameter import Encoding, Pairing, Parameter
 from mdfconv.errors import MdfconvError
 from mdfconv.registry import unknown_name
 
@@ -22,20 +26,11 @@ _STEP = 1e-6
 
 @dataclass(frozen=True)
 class Endpoint:
-    """A distribution and, where the value is stored in another form, its encoding.
-
-    Parameters
-    ----------
-    distribution : Distribution
-        The distribution, with its γ if it has one.
-    encoding : Encoding or None
-        The stored form; None for the parameter itself.
-    caution : str
-        What to know of the name by which the user called it; "" for nothing.
-    """
+    """A distribution and, where the value is stored in another form, its encoding."""
 
     distribution: Distribution
     encoding: Encoding | None = None
+    # What to know of the name by which the user called it.
     caution: str = field(default="", compare=False)
 
     @property
@@ -43,6 +38,11 @@ class Endpoint:
         """The name as the user may write it, such as ``"ggx:roughness"``."""
         suffix = f":{self.encoding.name}" if self.encoding else ""
         return f"{self.distribution.name}{suffix}"
+
+    @property
+    def pairing(self) -> Pairing | None:
+        """How a pair is stored, unless each axis is stored by itself."""
+        return self.encoding.pairing if self.encoding else None
 
     @property
     def stored(self) -> Parameter:
@@ -74,21 +74,22 @@ class Endpoint:
         legal = self.stored.accepts(values)
         if self.encoding:
             legal &= ~self.encoding.clamped(values)
-        stored = values if legal.all() else np.where(legal, values, np.nan)
+        values = values if legal.all() else np.where(legal, values, np.nan)
         if not self.encoding:
-            return stored
+            return values
         with np.errstate(all="ignore"):
-            parameter = self.encoding.decode(stored)
+            parameter = self.encoding.decode(values)
         return np.where(self.distribution.parameter.accepts(parameter), parameter, np.nan)
 
     def encode(self, parameter: Array) -> Array:
-        """Return the stored values for parameters; NaN where they cannot be stored."""
-        if not self.encoding:
-            return parameter
-        with np.errstate(all="ignore"):
-            stored = self.encoding.encode(parameter)
-        accepted = self.stored.accepts(stored) | self.encoding.clamped(stored)
-        return np.where(accepted, stored, np.nan)
+        """Return the stored values for parameters; NaN for what is illegal or cannot be stored."""
+        legal = self.distribution.parameter.accepts(parameter)
+        stored = parameter
+        if self.encoding:
+            with np.errstate(all="ignore"):
+                stored = self.encoding.encode(parameter)
+            legal = legal & (self.stored.accepts(stored) | self.encoding.clamped(stored))
+        return stored if legal.all() else np.where(legal, stored, np.nan)
 
     def encode_one(self, parameter: float) -> tuple[float | None, float | None]:
         """Return the stored value of a parameter and how much it changes with it, |ds/dp|.
@@ -109,47 +110,38 @@ class Endpoint:
         symbols = self.stored.symbol, self.distribution.parameter.symbol
         return {clamp.text(*symbols): stored == clamp.stored for clamp in self.encoding.clamps}
 
-    def axes(self, pair: tuple[Any, ...]) -> tuple[Any, ...]:
-        """Return what is stored for each axis by itself, for the pair that the user gives.
-
-        Raises
-        ------
-        MdfconvError
-            If the second number is illegal.
-        """
-        if not self.encoding or not self.encoding.pairing:
-            return pair
-        pairing = self.encoding.pairing
-        first = np.asarray(self.stored.check(pair[0], self.label), dtype=np.float64)
-        second = np.asarray(pairing.second.check(pair[1], self.label), dtype=np.float64)
-        x, y = pairing.axes(first, second)
-        return x[()], y[()]
+    def axes(self, values: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Return what is stored for each axis by itself; raise if a second number is illegal."""
+        if not self.pairing or len(values) == 1:
+            return values
+        first = np.asarray(self.stored.check(values[0], self.label), dtype=np.float64)
+        second = np.asarray(self.pairing.second.check(values[1], self.label), dtype=np.float64)
+        x, y = self.pairing.axes(first, second)
+        return _plain(x), _plain(y)
 
     def pair(self, x: Any, y: Any) -> tuple[Any, Any]:
-        """Return the pair to give to the user, for what is stored for each axis by itself.
-
-        Raises
-        ------
-        MdfconvError
-            If there is no such pair.
-        """
-        if not self.encoding or not self.encoding.pairing:
+        """Return the pair for what is stored for each axis by itself; raise if there is none."""
+        if not self.pairing:
             return x, y
-        pairing = self.encoding.pairing
         with np.errstate(all="ignore"):
-            first, second = pairing.pair(np.asarray(x, float), np.asarray(y, float))
-        if not np.all(self.stored.accepts(first) & pairing.second.accepts(second)):
+            first, second = self.pairing.pair(np.asarray(x, float), np.asarray(y, float))
+        if not np.all(self.stored.accepts(first) & self.pairing.second.accepts(second)):
             raise MdfconvError(
-                f"{self.label} has no such pair: its {pairing.second.name} is "
-                f"{pairing.second.legal}, and x is the rougher axis"
+                f"{self.label} has no such pair: its {self.pairing.second.name} is "
+                f"{self.pairing.second.legal}, and x is the rougher axis"
             )
-        return first[()], second[()]
+        return _plain(first), _plain(second)
 
     def _check_clamps(self, values: ArrayLike) -> None:
         stored = np.asarray(values)
         for text, which in self.clamped(stored).items():
             if np.any(which):
                 raise MdfconvError(f"{self.label} has no inverse here: {text}")
+
+
+def _plain(numbers: Array) -> Any:
+    """Return an array, or the float that it is without dimensions."""
+    return numbers if np.ndim(numbers) else float(numbers)
 
 
 def endpoint(name: str | Endpoint) -> Endpoint:
@@ -281,6 +273,20 @@ def encodings_of(owner: Distribution) -> list[str]:
     return [DEFAULT_ENCODING, *own] if named_by_itself else own
 
 
+def stored_forms(owner: Distribution) -> list[tuple[Endpoint, Dialect | None]]:
+    """Return every stored form of a parameter, and the dialect that it is of, if it is of one.
+
+    A rule that needs a specular weight is given 1.
+    """
+    own = [(Endpoint(owner, encoding), None) for encoding in owner.encodings]
+    dialects = [
+        (Endpoint(owner, dialect.encoding(owner.parameter, weight)), dialect)
+        for dialect in dialects_of(owner.name).values()
+        for weight in ["1" if dialect.specular is Specular.needed else ""]
+    ]
+    return [*own, *dialects]
+
+
 def _encoding(owner: Distribution, name: str) -> Encoding | None:
     key, _, setting = (part.strip().lower() for part in name.partition(":"))
     known = encodings_of(owner)
@@ -298,3 +304,54 @@ def _encoding(owner: Distribution, name: str) -> Encoding | None:
     if setting:
         raise MdfconvError(f"{owner.name}:{key} takes no '{setting}'")
     return {encoding.name: encoding for encoding in owner.encodings}.get(key)
+
+
+@dataclass(frozen=True)
+class ParameterMap:
+    """A formula from one distribution's parameter to another's, and where it stops being monotonic.
+
+    The text has its place in the source; it is empty where there is nothing to say.
+    """
+
+    text: str
+    function: Callable[[Array], Array]
+    turns_at: float = float("inf")
+
+
+def to_root(mdf: Distribution, *, same_lobe: bool) -> tuple[Distribution, Sequence[ParameterMap]]:
+    """Return the distribution in whose parameter another one can be expressed, and how.
+
+    A distribution is its own root unless it declares an equivalent, which may have to have the
+    same lobes.
+    """
+    equal = mdf.equivalent
+    if equal is None or (same_lobe and not equal.same_lobe):
+        return mdf, ()
+    return distribution(equal.name), (ParameterMap(equal.forward_text, equal.forward),)
+
+
+def from_root(mdf: Distribution, *, same_lobe: bool) -> Sequence[ParameterMap]:
+    """Return the steps from the root's parameter back, as for `to_root`."""
+    equal = mdf.equivalent
+    if equal is None or (same_lobe and not equal.same_lobe):
+        return ()
+    return (ParameterMap(equal.backward_text, equal.backward),)
+
+
+def exact_route(source: Distribution, target: Distribution) -> Sequence[ParameterMap] | None:
+    """Return the steps between two distributions that have the same lobes; None for others."""
+    if source.is_same(target):
+        return ()
+    first, forward = to_root(source, same_lobe=True)
+    last, _ = to_root(target, same_lobe=True)
+    if not first.is_same(last):
+        return None
+    return (*forward, *from_root(target, same_lobe=True))
+
+
+def follow(steps: Sequence[ParameterMap], parameter: Array) -> Array:
+    """Return what the steps make of parameters, one after the other; infinite at an end of both."""
+    with np.errstate(all="ignore"):
+        for step in steps:
+            parameter = step.function(parameter)
+    return parameter

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.equivalence import follow, from_root, to_root
+from mdfconv.distributions.endpoint import follow, from_root, to_root
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.metrics.base import scaled

@@ -8,9 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mdfconv.conversion.arrays import check_covered
-from mdfconv.conversion.methods import default_method, method_named
-from mdfconv.distributions.equivalence import exact_route, follow
+from mdfconv.conversion.methods import check_covered, default_method, method_named
+from mdfconv.distributions.endpoint import exact_route, follow
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import metric_named

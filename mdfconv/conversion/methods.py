@@ -362,7 +362,7 @@ class Fast(Method):
         """Evaluate the polynomials; NaN outside their range."""
         stored = _stored(source, target, metric)
         if len(metric.from_stored()) > 1 and not stored.exact:
-            from mdfconv.fitting.map_making import made_map
+            from mdfconv.fitting.maps import made_map
 
             if parameter.size < _MANY:
                 return LeastSquares().convert(parameter, source, target, metric)

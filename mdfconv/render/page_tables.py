@@ -16,7 +16,7 @@ from mdfconv.distributions.dialects import Specular, dialects_of
 from mdfconv.distributions.endpoint import DEFAULT_ENCODING, Endpoint, encodings_of, endpoint
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
-from mdfconv.light.lobe_spectrum import LobeSpectrum
+from mdfconv.light.spectrum import LobeSpectrum
 
 # The metric with which the page begins: light from all around is the usual case.
 FIRST_METRIC = "environment"

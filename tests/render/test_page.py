@@ -15,7 +15,7 @@ import mdfconv
 from mdfconv.distributions import distribution
 from mdfconv.distributions.endpoint import endpoint
 from mdfconv.fitting.metrics import list_metrics, metric_named
-from mdfconv.light.lobe_spectrum import LobeSpectrum
+from mdfconv.light.spectrum import LobeSpectrum
 from mdfconv.render.comparison import ConversionRule, Scene, compare
 from mdfconv.render.comparison_figure import BACKGROUND, _bytes
 from mdfconv.render.page import comparison_page, filled, page_data

@@ -235,8 +235,7 @@ def _results(numbers: list[Value], rule: ConversionRule) -> tuple[list[str], lis
         cautions = [text for conversion in conversions for text in conversion.cautions]
         return [value_text(conversion.result) for conversion in conversions], cautions
     converted = rule.convert(np.array(numbers, dtype=float))
-    cautions = [text for text, which in rule.cautions(converted).items() if which.any()]
-    return list(map(number_text, converted.stored.tolist())), cautions
+    return list(map(number_text, converted.stored.tolist())), rule.true_cautions(converted)
 
 
 def _at_its_line(error: MdfconvError, block: NumberBlock, rule: ConversionRule) -> MdfconvError:

@@ -71,7 +71,7 @@ def command(
 
 def _list_encodings(metric: Metric, format_: Format | None) -> None:
     """Print the table of encodings and dialects."""
-    from mdfconv.scene.encodings import EXPONENTS, encoding_records
+    from mdfconv.scene.shininess import EXPONENTS, encoding_records
 
     form = form_of(format_)
     records = encoding_records(metric)

@@ -262,23 +262,26 @@ class ConversionRule:
 
     def convert(self, axis: Any, *, gaps: bool = False) -> Converted:
         """Convert the numbers of an axis; with gaps NaN where there is no answer, else raise."""
-        with np.errstate(all="ignore"):
-            if gaps:
-                parameter = self.source.decode_legal(np.asarray(axis, dtype=float))
-            else:
-                parameter = self.source.decode(axis)
-            if self.exact is not None:
-                solution = Solution(np.asarray(follow(self.exact, parameter)))
-            else:
-                check_covered(self.method, self.metric, *self.ends)
-                solution = self.method.solve(parameter, *self.pair, self.metric)
-            stored = self.target.encode(solution.parameter)
+        if gaps:
+            parameter = self.source.decode_legal(np.asarray(axis, dtype=float))
+        else:
+            parameter = self.source.decode(axis)
+        solution = self.solve(parameter)
+        stored = self.target.encode(solution.parameter)
         if not gaps and np.isnan(stored).any():
             index, size = int(np.argmax(np.isnan(stored))), np.size(stored)
             which = f" (value {index + 1} of {size})" if size > 1 else ""
             result = solution.parameter.flat[index]
-            raise self._refusal(float(parameter.flat[index]), float(result), which)
+            raise self.refusal(float(parameter.flat[index]), float(result), which)
         return Converted(parameter, stored, *solution)
+
+    def solve(self, parameter: Array) -> Solution:
+        """Return what the target has for parameters, whether it is legal or not."""
+        with np.errstate(all="ignore"):
+            if self.exact is not None:
+                return Solution(np.asarray(follow(self.exact, parameter)))
+            check_covered(self.method, self.metric, *self.ends)
+            return self.method.solve(parameter, *self.pair, self.metric)
 
     def cautions(self, converted: Converted) -> dict[str, Mask]:
         """Return sentences, and of which of the numbers they are true."""
@@ -287,7 +290,8 @@ class ConversionRule:
         clamped = self.target.clamped(converted.stored)
         cautions |= {f"{self.target.label} clamps: {text}": clamped[text] for text in clamped}
         if self._same_lobes is None:
-            cautions |= self.method.cautions(converted.parameter, converted.result, *self.pair)
+            with np.errstate(all="ignore"):
+                cautions |= self.method.cautions(converted.parameter, converted.result, *self.pair)
         if converted.gamma_at_limit is not None:
             low, high = self.pair[1].parameters[1].fit_range
             sentence = (
@@ -297,7 +301,11 @@ class ConversionRule:
             cautions[sentence] = converted.gamma_at_limit
         return cautions
 
-    def _refusal(self, parameter: float, result: float, which: str) -> MdfconvError:
+    def true_cautions(self, converted: Converted) -> list[str]:
+        """Return the sentences that are true of any of the numbers."""
+        return [text for text, which in self.cautions(converted).items() if which.any()]
+
+    def refusal(self, parameter: float, result: float, which: str = "") -> MdfconvError:
         """Return the error for a result that is illegal, with what the other methods make of it."""
         source, target = self.pair
         start = f"{source.name} {source.parameter.symbol} = {number_text(parameter)}{which}"
@@ -350,7 +358,7 @@ def metric_or_default(metric: str | Metric | None) -> Metric:
 def _convert(values: Any, rule: ConversionRule, threads: int, warned: list[str]) -> Any:
     """Convert numbers, or a pair; add what the caller is to be warned of."""
     results: list[Any] = []
-    cautions: dict[str, Mask] = {}
+    cautions: dict[str, None] = {}
     values = rule.read(values)
     for axis in rule.source.axes(values):
         results.append(_convert_axis(axis, rule, threads, warned, cautions))
@@ -360,7 +368,7 @@ def _convert(values: Any, rule: ConversionRule, threads: int, warned: list[str])
 
 
 def _convert_axis(
-    axis: Any, rule: ConversionRule, threads: int, warned: list[str], cautions: dict[str, Mask]
+    axis: Any, rule: ConversionRule, threads: int, warned: list[str], cautions: dict[str, None]
 ) -> Any:
     """Return the stored results for the numbers of an axis, in their shape and floating type."""
     if rule.free:
@@ -371,7 +379,7 @@ def _convert_axis(
 
     def convert_part(numbers: Any) -> Array:
         converted = rule.convert(numbers, gaps=gaps)
-        cautions.update(_cautions_of_extremes(converted, rule))
+        cautions.update(dict.fromkeys(_cautions_of_extremes(converted, rule)))
         return converted.stored
 
     stored = _in_threads(convert_part, axis, threads)
@@ -404,18 +412,16 @@ def _in_threads(function: Callable[[Any], Array], axis: Any, threads: int) -> Ar
     return result.reshape(axis.shape)
 
 
-def _cautions_of_extremes(converted: Converted, rule: ConversionRule) -> dict[str, Mask]:
+def _cautions_of_extremes(converted: Converted, rule: ConversionRule) -> list[str]:
     """Return the cautions about the least and the largest numbers: those are beyond a limit."""
     clamps = rule.target.encoding is not None and bool(rule.target.encoding.clamps)
     silent = not rule.method.has_cautions or rule.pair[0].is_same(rule.pair[1])
     if silent and not clamps and not any(end.caution for end in rule.ends):
-        return {}
+        return []
     parameter = _extremes(converted.parameter)
     result = _extremes(converted.result) if rule.method.follows_metric else parameter
     stored = _extremes(converted.stored) if clamps else result
-    with np.errstate(all="ignore"):
-        cautions = rule.cautions(Converted(parameter, stored, result))
-    return {text: which for text, which in cautions.items() if which.any()}
+    return rule.true_cautions(Converted(parameter, stored, result))
 
 
 def _extremes(values: Array) -> Array:

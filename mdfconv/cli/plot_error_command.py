@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.names import asked_endpoint, in_asked_forms
 from mdfconv.cli.options import (
     DpiOption,
     ExposureOption,
@@ -17,7 +16,9 @@ from mdfconv.cli.options import (
     FormatOption,
     MethodOption,
     OptionalMetricOption,
+    asked_endpoint,
     asked_metric,
+    in_asked_forms,
     refuse_given,
 )
 from mdfconv.cli.outputs import Outputs, check_folder, value_name

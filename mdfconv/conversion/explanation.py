@@ -45,20 +45,13 @@ def remaining_error(
     that floats do not resolve: narrower than 1e-30, or so wide or steep that their squares
     overflow.
     """
-    columns = []
-    for rows in _blocks(parameter.size):
+    blocks: list[Array] = [np.zeros((2, 0))]
+    for start in range(0, parameter.size, _ROWS_AT_ONCE):
+        rows = slice(start, start + _ROWS_AT_ONCE)
+        lobes = source, parameter[rows], target, result[rows]
         with np.errstate(all="ignore"):
-            columns.append(
-                _errors(
-                    source,
-                    parameter[rows],
-                    target,
-                    result[rows],
-                    metric,
-                    None if gamma is None else gamma[rows],
-                )
-            )
-    rmse, maximum = np.concatenate([np.zeros((2, 0)), *columns], axis=1)
+            blocks.append(_errors(*lobes, metric, None if gamma is None else gamma[rows]))
+    rmse, maximum = np.concatenate(blocks, axis=1)
     return rmse, maximum
 
 
@@ -71,24 +64,19 @@ def _errors(
     gamma: Array | None,
 ) -> Array:
     """Return both errors, shape (2, n), of so few values that the angles stay in the cache."""
-    sources = source, parameter
     if gamma is None:
-        shaped = target
-        widths = narrowest(*sources, target, result)
+        widths = narrowest(source, parameter, target, result)
     else:
         # A free γ makes the target as wide as the source.
-        shaped = target.with_gammas(gamma[:, None])
-        widths = np.arctan(bounded_tangent(*sources))
+        target = target.with_gammas(gamma[:, None])
+        widths = np.arctan(bounded_tangent(source, parameter))
     resolved = widths >= _NARROWEST
     # Where nothing can be said the angles are those of any lobe.
     angles = metric.quadrature(np.where(resolved, widths, 1.0))
-    problem = FitProblem(*sources, shaped, metric, angles, np.arange(widths.size))
+    rows = np.arange(widths.size)
+    problem = FitProblem(source, parameter, target, metric, angles, rows)
     errors: Array = np.stack(problem.relative_error(result))
     return np.where(resolved & np.isfinite(errors).all(axis=0), errors, np.nan)
-
-
-def _blocks(size: int) -> list[slice]:
-    return [slice(start, start + _ROWS_AT_ONCE) for start in range(0, size, _ROWS_AT_ONCE)]
 
 
 _NO_ERROR = "the lobe is beyond what double precision resolves: its error is not known"

@@ -248,17 +248,17 @@ class ConversionRule:
     def _check_pair(self, values: tuple[Any, ...]) -> None:
         """Raise unless a pair has two members, and both distributions take it."""
         _check_members(values)
-        for mdf in self.pair:
-            if not mdf.anisotropic:
-                others = [
-                    other.name
-                    for other in list_distributions()
-                    if other.anisotropic and other.equivalent and other.equivalent.name == mdf.name
-                ]
-                raise MdfconvError(
-                    f"{mdf.name} is isotropic: it takes one parameter, not a pair",
-                    f"use {others[0]}" if others else "",
-                )
+        isotropic = [mdf.name for mdf in self.pair if not mdf.anisotropic]
+        if isotropic:
+            others = [
+                f"use {mdf.name}"
+                for mdf in list_distributions()
+                if mdf.anisotropic and mdf.equivalent and mdf.equivalent.name == isotropic[0]
+            ]
+            raise MdfconvError(
+                f"{isotropic[0]} is isotropic: it takes one parameter, not a pair",
+                "".join(others[:1]),
+            )
 
     def convert(self, axis: Any, *, gaps: bool = False) -> Converted:
         """Convert the numbers of an axis; with gaps NaN where there is no answer, else raise."""

@@ -145,18 +145,7 @@ def _plain(numbers: Array) -> Any:
 
 
 def endpoint(name: str | Endpoint) -> Endpoint:
-    """Return the endpoint for a name such as ``"ggx"`` or ``"ggx:roughness"``.
-
-    Parameters
-    ----------
-    name : str or Endpoint
-        Distribution, with an encoding after a colon if it is not the parameter itself.
-
-    Raises
-    ------
-    MdfconvError
-        If the distribution or the encoding is not known.
-    """
+    """Return the endpoint for a name such as ``"ggx"`` or ``"ggx:roughness"``."""
     if isinstance(name, Endpoint):
         return name
     if not isinstance(name, str):
@@ -169,13 +158,7 @@ def endpoint(name: str | Endpoint) -> Endpoint:
 
 
 def one_parameter_endpoint(name: str | Endpoint) -> Endpoint:
-    """Return the endpoint for a name, as `endpoint`.
-
-    Raises
-    ------
-    MdfconvError
-        As `endpoint`, and if the distribution only makes a difference for pairs of parameters.
-    """
+    """Return the endpoint for a name; raise if its distribution is only for pairs of parameters."""
     end = endpoint(name)
     one_parameter_distribution(end.distribution.name)
     return end
@@ -197,33 +180,20 @@ def _owner(name: str) -> Distribution:
 def endpoints(
     source: str | Endpoint, target: str | Endpoint, gamma: float | None = None
 ) -> tuple[Endpoint, Endpoint]:
-    """Return both ends of a conversion.
-
-    Parameters
-    ----------
-    source, target : str or Endpoint
-        As for `endpoint`.
-    gamma : float, optional
-        The second parameter, for each end that has one; its default if not given.
-
-    Raises
-    ------
-    MdfconvError
-        As `endpoint`, and if γ is illegal or neither end has one.
-    """
+    """Return both ends of a conversion, with a γ for each that has one; raise if neither has."""
     first, last = endpoint(source), endpoint(target)
     if gamma is None:
         return first, last
-    second = [end.distribution.second_parameter for end in (first, last)]
-    if not any(second):
+    if not any(end.distribution.second_parameter for end in (first, last)):
         raise MdfconvError(
             f"neither {first.distribution.name} nor {last.distribution.name} has a second "
             "parameter γ"
         )
-    return (
-        with_gamma(first, gamma) if second[0] else first,
-        with_gamma(last, gamma) if second[1] else last,
+    first, last = (
+        with_gamma(end, gamma) if end.distribution.second_parameter else end
+        for end in (first, last)
     )
+    return first, last
 
 
 def with_gamma(end: Endpoint, gamma: float | None) -> Endpoint:
@@ -236,55 +206,50 @@ def with_gamma(end: Endpoint, gamma: float | None) -> Endpoint:
 def with_specular(source: str, target: str, specular: float | None) -> tuple[str, str]:
     """Return the names of both ends, with a specular weight for those that depend on it.
 
-    Parameters
-    ----------
-    source, target : str
-        As `endpoint` takes them.
-    specular : float or None
-        The weight of the specular lobe, or the luminance of its colour; None changes nothing.
-
-    Raises
-    ------
-    MdfconvError
-        If none of them depends on it.
+    None as the weight changes nothing; one for names that do not depend on it is refused.
     """
     if specular is None:
         return source, target
-    depend = [_takes_specular(name) for name in (source, target)]
-    if not any(depend):
+    source_with, target_with = (_with_weight(name, specular) for name in (source, target))
+    if (source_with, target_with) == (source, target):
         raise MdfconvError(
             f"neither {source} nor {target} depends on a specular weight", argument="specular"
         )
-    setting = f":{specular!r}"
-    return source + setting * depend[0], target + setting * depend[1]
+    return source_with, target_with
 
 
-def _takes_specular(name: str) -> bool:
+def _with_weight(name: str, specular: float) -> str:
     head, _, tail = name.partition(":")
     dialect = dialects_of(distribution(head).name).get(tail.strip().lower())
-    return dialect is not None and dialect.specular is not Specular.no
+    depends = dialect is not None and dialect.specular is not Specular.no
+    return f"{name}:{specular!r}" if depends else name
 
 
 def encodings_of(owner: Distribution) -> list[str]:
     """Return the names of the forms in which a parameter is stored; none if it has but one."""
-    own = [*(encoding.name for encoding in owner.encodings), *dialects_of(owner.name)]
+    forms = list(forms_of(owner))
     # Exponents are not an α.
-    named_by_itself = own and not owner.parameter.larger_is_smoother
-    return [DEFAULT_ENCODING, *own] if named_by_itself else own
+    named_by_itself = forms and not owner.parameter.larger_is_smoother
+    return [DEFAULT_ENCODING, *forms] if named_by_itself else forms
 
 
 def stored_forms(owner: Distribution) -> list[tuple[Endpoint, Dialect | None]]:
-    """Return every stored form of a parameter, and the dialect that it is of, if it is of one.
+    """Return every form but the parameter itself, and the dialect that it is, if it is one.
 
     A rule that needs a specular weight is given 1.
     """
-    own = [(Endpoint(owner, encoding), None) for encoding in owner.encodings]
-    dialects = [
-        (Endpoint(owner, dialect.encoding(owner.parameter, weight)), dialect)
-        for dialect in dialects_of(owner.name).values()
-        for weight in ["1" if dialect.specular is Specular.needed else ""]
-    ]
-    return [*own, *dialects]
+    forms: list[tuple[Endpoint, Dialect | None]] = []
+    for name, form in forms_of(owner).items():
+        dialect = form if isinstance(form, Dialect) else None
+        needs_weight = dialect is not None and dialect.specular is Specular.needed
+        forms.append((Endpoint(owner, _encoding(owner, name + ":1" * needs_weight)), dialect))
+    return forms
+
+
+def forms_of(owner: Distribution) -> dict[str, Encoding | Dialect]:
+    """Return the stored forms of a parameter by their names, its own first."""
+    own = {encoding.name: encoding for encoding in owner.encodings}
+    return own | dialects_of(owner.name)
 
 
 def _encoding(owner: Distribution, name: str) -> Encoding | None:
@@ -298,12 +263,12 @@ def _encoding(owner: Distribution, name: str) -> Encoding | None:
     if key not in known:
         meant = [owner.meant_by[key]] if key in owner.meant_by else []
         raise unknown_name(f"encoding of {owner.name}", name, known, meant)
-    dialect = dialects_of(owner.name).get(key)
-    if dialect:
-        return dialect.encoding(owner.parameter, setting)
+    form = forms_of(owner).get(key)
+    if isinstance(form, Dialect):
+        return form.encoding(owner.parameter, setting)
     if setting:
         raise MdfconvError(f"{owner.name}:{key} takes no '{setting}'")
-    return {encoding.name: encoding for encoding in owner.encodings}.get(key)
+    return form
 
 
 @dataclass(frozen=True)

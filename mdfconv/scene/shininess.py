@@ -14,8 +14,8 @@ import numpy as np
 
 from mdfconv.conversion import convert
 from mdfconv.distributions import list_distributions
-from mdfconv.distributions.dialects import DIALECTS, Dialect, Specular, dialects_of
-from mdfconv.distributions.endpoint import endpoint, endpoints
+from mdfconv.distributions.dialects import DIALECTS, Specular
+from mdfconv.distributions.endpoint import endpoints, stored_forms
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
 from mdfconv.scene.stored import UNIFORM_BELOW, StoredConverter
@@ -167,10 +167,7 @@ def encoding_records(metric: Metric) -> list[dict[str, Any]]:
         an exponent ``roughness_100`` and ``rmse_100``, and so on for each of `EXPONENTS`: of GGX
         in Blinn/Phong's place, with a specular weight of 1; infinite for a mirror.
     """
-    texts = ("encoding", "formula", "range", "clamped", "programs", "source", "note")
     costs = [f"{what}_{n}" for n in EXPONENTS for what in ("roughness", "rmse")]
-    blank: dict[str, Any] = dict.fromkeys(texts, "")
-    blank |= {"specular": Specular.no.value} | dict.fromkeys(costs)
     by_importer: dict[str, dict[str, float]] = {importer: {} for importer in IMPORTERS}
     for n, results in zip(
         EXPONENTS, importer_results(np.array(EXPONENTS, float), metric), strict=True
@@ -180,26 +177,18 @@ def encoding_records(metric: Metric) -> list[dict[str, Any]]:
             by_importer[result.importer] |= cost
     records = []
     for owner in list_distributions():
-        for own in owner.encodings:
-            known = {"encoding": f"{owner.name}:{own.name}", "formula": own.formula}
-            records.append(blank | known | {"range": own.stored.legal})
-        for dialect in dialects_of(owner.name).values():
-            cost = by_importer.get(dialect.name, {})
-            records.append(blank | _texts(owner.name, dialect) | cost)
+        for end, dialect in stored_forms(owner):
+            assert end.encoding is not None, "it is a stored form"
+            name = dialect.name if dialect else end.encoding.name
+            record = {
+                "encoding": f"{owner.name}:{name}",
+                "formula": end.encoding.formula,
+                "range": end.stored.legal,
+                "clamped": "; ".join(end.clamped(np.empty(0))),
+                "programs": dialect.program if dialect else "",
+                "source": dialect.source if dialect else "",
+                "note": dialect.note if dialect else "",
+                "specular": (dialect.specular if dialect else Specular.no).value,
+            }
+            records.append(record | dict.fromkeys(costs) | by_importer.get(name, {}))
     return records
-
-
-def _texts(owner: str, dialect: Dialect) -> dict[str, str]:
-    """Return what is to be read of a dialect."""
-    name = f"{owner}:{dialect.name}"
-    end = endpoint(f"{name}:1" if dialect.specular is Specular.needed else name)
-    return {
-        "encoding": name,
-        "formula": dialect.formula,
-        "range": end.stored.legal,
-        "clamped": "; ".join(end.clamped(np.empty(0))),
-        "programs": dialect.program,
-        "source": dialect.source,
-        "note": dialect.note,
-        "specular": dialect.specular.value,
-    }

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import mdfconv
@@ -48,6 +48,7 @@ def one_by_one(answer):
     return np.ravel(answer).tolist()
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(VALUES, ENDS, st.sampled_from(["half-angle", "peak", "fit"]))
 def test_convert_and_explain_agree(values, ends, method):
     shape = np.shape(values) if isinstance(values, np.ndarray) else ()

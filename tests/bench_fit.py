@@ -16,7 +16,7 @@ import mdfconv
 from mdfconv.fitting.metrics.base import Unit
 from mdfconv.fitting.quadrature import UniformSamples
 from mdfconv.fitting.solve import fit
-from mdfconv.measured.lobe_fit import fit_lobe
+from mdfconv.measured.brdf_fit import fit_distribution
 from mdfconv.measured.readers.merl import read_merl
 from mdfconv.studies.table2 import FITTED, SAMPLES, paper_sweep
 
@@ -55,7 +55,7 @@ def merl(path):
 def read_and_fit(path):
     """Read the file and fit every distribution."""
     data = read_merl(path)
-    return [fit_lobe(data, entry) for entry in mdfconv.list_distributions()]
+    return [fit_distribution(data, entry) for entry in mdfconv.list_distributions()]
 
 
 def seconds(function, *arguments):

@@ -6,11 +6,10 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from shlex import join
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -35,48 +34,16 @@ from mdfconv.registry import ALL
 if TYPE_CHECKING:
     from mdfconv.distributions import Distribution
     from mdfconv.distributions.endpoint import Endpoint
-    from mdfconv.measured.analysis import Analysis, FitOptions
-    from mdfconv.measured.readers import ReadOptions
+    from mdfconv.measured import Analysis, ReadOptions
 
 # What a narrow terminal and the page of fits to two directions show first.
 _CHIEF = ("file", "channel", "distribution", "parameter", "gamma", "rmse", "simplest")
 _SECOND = ("stderr", "error", "reflectance", "diffuse", "specular", "masking")
 
 
-class Quantity(StrEnum):
-    """What was measured."""
-
-    ndf = "ndf"
-    brdf = "brdf"
-
-
-class Loss(StrEnum):
-    """What a fit minimizes."""
-
-    linear = "linear"
-    log = "log"
-    cosine = "cosine"
-
-
-class AngleIs(StrEnum):
-    """What one angle is the angle of."""
-
-    half = "half"
-    reflected = "reflected"
-    incident = "incident"
-
-
-def _column_option(name: str, what: str) -> Any:
-    help_ = f"Column of the {what}, by name or number from 1."
+def _column_option(name: str, what: str, otherwise: str = "") -> Any:
+    help_ = f"Column of {what}, by name or number from 1{otherwise}."
     return typer.Option(name, metavar="COLUMN", help=help_)
-
-
-class Masking(StrEnum):
-    """The masking of a BRDF."""
-
-    smith = "smith"
-    v_cavity = "v-cavity"
-    none = "none"
 
 
 def command(
@@ -98,27 +65,23 @@ def command(
         ),
     ] = None,
     quantity: Annotated[
-        Quantity | None,
+        Literal["ndf", "brdf"] | None,
         typer.Option(help="ndf (default for text), or brdf at θ_d ≈ 0 (default for MERL, ALTA)."),
     ] = None,
     angle: Annotated[
-        str | None,
-        typer.Option(
-            metavar="COLUMN",
-            help="Column of angles, by name or number from 1; by default from the names.",
-        ),
+        str | None, _column_option("--angle", "angles", "; by default from the names")
     ] = None,
     angle_is: Annotated[
-        AngleIs | None,
+        Literal["half", "reflected", "incident"] | None,
         typer.Option(
             help="Of one angle: that of the half vector (default), or the zenith of the reflected "
             "or incident direction, the other along the normal."
         ),
     ] = None,
-    theta_i: Annotated[str | None, _column_option("--theta-i", "incident zenith")] = None,
-    phi_i: Annotated[str | None, _column_option("--phi-i", "incident azimuth")] = None,
-    theta_o: Annotated[str | None, _column_option("--theta-o", "outgoing zenith")] = None,
-    phi_o: Annotated[str | None, _column_option("--phi-o", "outgoing azimuth")] = None,
+    theta_i: Annotated[str | None, _column_option("--theta-i", "the incident zenith")] = None,
+    phi_i: Annotated[str | None, _column_option("--phi-i", "the incident azimuth")] = None,
+    theta_o: Annotated[str | None, _column_option("--theta-o", "the outgoing zenith")] = None,
+    phi_o: Annotated[str | None, _column_option("--phi-o", "the outgoing azimuth")] = None,
     angle_unit: Annotated[
         str | None,
         typer.Option(
@@ -148,14 +111,14 @@ def command(
         typer.Option("--separate", help="Fit every channel on its own, not with one parameter."),
     ] = False,
     loss: Annotated[
-        Loss,
+        Literal["linear", "log", "cosine"],
         typer.Option(
             help="Squared residuals, those of logarithms, or of two directions those of f_r "
             "cos θ_i cos θ_o."
         ),
-    ] = Loss.linear,
+    ] = "linear",
     masking: Annotated[
-        Masking | None,
+        Literal["smith", "v-cavity", "none"] | None,
         typer.Option(
             help="Of two directions: smith, where a distribution has its Λ, else v-cavity; or one "
             "for all."
@@ -216,7 +179,8 @@ def command(
 
     mdfconv fit '*.csv' --format csv -o fits.csv
     """
-    from mdfconv.measured.readers import ReadOptions
+    from mdfconv.measured import ReadOptions
+    from mdfconv.measured.brdf_fit import BrdfModel
     from mdfconv.output.files import find_files
 
     files = find_files(data)
@@ -228,74 +192,64 @@ def command(
 
         check_report_name(report)
     ends = _ends(targets or [])
-    options = _options(
-        ends, gamma, _model(loss, masking, fresnel, robust=robust), quantity, max_angle,
-        tolerance, separate=separate,
-    )  # fmt: skip
+    fixed = chosen_gamma(gamma)
+    shape = fixed if isinstance(fixed, float) else None
+    options = {
+        "targets": _targets(ends, shape),
+        "gamma": shape,
+        **vars(BrdfModel(loss, masking or "smith", fresnel or "none", robust)),
+        "quantity": quantity,
+        "max_angle": max_angle,
+        "separate": separate,
+        "tolerance": tolerance,
+    }
     columns = ReadOptions(
-        angle, theta_i, phi_i, theta_o, phi_o, tuple(values or ()), angle_unit,
-        angle_is.value if angle_is else None, cells,
-    )  # fmt: skip
-    only_two = bool(masking or fresnel or robust or loss is Loss.cosine)
-    analyses = _analyses(files, columns, options, only_two=only_two)
-    form = form_of(format_, output)
-    names, rows = _table(analyses, form, ends, separate)
+        angle, theta_i, phi_i, theta_o, phi_o, tuple(values or ()), angle_unit, angle_is, cells
+    )
+    needs_two = bool(masking or fresnel or robust or loss == "cosine")
+    work = partial(_analysis, columns=columns, options=options, needs_two=needs_two)
+    analyses = [work(files[0])] if len(files) == 1 else _in_processes(work, files)
+    names, rows = _table(analyses, ends, separate=separate)
     contents: dict[Path, bytes] = {}
-    logarithms = loss is Loss.log
+    logarithms = loss == "log"
     if png:
-        from mdfconv.measured.report import draw_analysis
+        from mdfconv.measured.figures import draw_analysis
 
         contents[png] = draw_analysis(analyses[0], logarithms=logarithms)
     if report:
-        contents |= _report(analyses[0], report, ends, separate=separate, logarithms=logarithms)
+        from mdfconv.measured.report import report_files
+
+        line = join(["mdfconv", *sys.argv[1:]])
+        texts = _shown(rows, Format.markdown)
+        contents |= report_files(analyses[0], texts, line, report, logarithms=logarithms)
     title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
     ranked = "log_rmse" if logarithms and "log_rmse" in names else "rmse"
     minor = [*_SECOND, *(name for name in names if name not in _CHIEF + _SECOND), "rmse"]
     minor.remove(ranked)
-    write_table(names, rows, form, outputs, beside=contents, title=title, secondary=minor)
+    form = form_of(format_, output)
+    shown = _shown(rows, form)
+    write_table(names, shown, form, outputs, beside=contents, title=title, secondary=minor)
     for analysis in analyses:
         _tell(analysis, tolerance, named=len(analyses) > 1)
 
 
-def _model(loss: Loss, masking: Masking | None, fresnel: str | None, *, robust: bool) -> Any:
-    from mdfconv.measured.brdf_fit import BrdfModel
+def _analysis(
+    path: Path, columns: ReadOptions, options: dict[str, Any], *, needs_two: bool
+) -> Analysis:
+    """Return the fits to a file."""
+    from mdfconv.measured import Samples, fit, read
 
-    used = masking.value if masking else Masking.smith.value
-    return BrdfModel(loss.value, used, fresnel or "none", robust)
-
-
-def _options(
-    ends: Sequence[Endpoint],
-    gamma: str | None,
-    model: Any,
-    quantity: Quantity | None,
-    max_angle: float | None,
-    tolerance: float,
-    *,
-    separate: bool,
-) -> FitOptions:
-    from mdfconv.measured.analysis import FitOptions
-
-    fixed = chosen_gamma(gamma)
-    shape = fixed if isinstance(fixed, float) else None
-    return FitOptions(
-        targets=tuple(_targets(ends, shape)),
-        gamma=shape,
-        model=model,
-        quantity=quantity.value if quantity else None,
-        max_angle=max_angle,
-        separate=separate,
-        tolerance=tolerance,
-    )
+    samples = read(path, columns)
+    if needs_two and isinstance(samples, Samples):
+        raise MdfconvError(
+            f"{path}: --masking, --fresnel, --robust and --loss cosine need two directions",
+            "this file has one angle",
+        )
+    return fit(samples, name=path.name, **options)
 
 
-def _analyses(
-    files: Sequence[Path], columns: ReadOptions, options: FitOptions, *, only_two: bool
-) -> list[Analysis]:
-    """Return the fits to each file; to several in processes."""
-    work = partial(_analyse, columns=columns, options=options, only_two=only_two)
-    if len(files) == 1:
-        return [work(files[0])]
+def _in_processes(work: Callable[[Path], Analysis], files: Sequence[Path]) -> list[Analysis]:
+    """Return the fits to several files, with a bar on a terminal."""
     analyses = []
     with (
         progress("Files", len(files)) as advance,
@@ -307,22 +261,8 @@ def _analyses(
     return analyses
 
 
-def _analyse(path: Path, columns: ReadOptions, options: FitOptions, *, only_two: bool) -> Analysis:
-    from mdfconv.measured.analysis import analyse
-    from mdfconv.measured.readers import read
-    from mdfconv.measured.samples import DirectionalSamples
-
-    samples = read(path, columns)
-    if only_two and not isinstance(samples, DirectionalSamples):
-        raise MdfconvError(
-            f"{path}: --masking, --fresnel, --robust and --loss cosine need two directions",
-            "this file has one angle",
-        )
-    return analyse(path.name, samples, options)
-
-
 def _table(
-    analyses: Sequence[Analysis], form: Format, ends: Sequence[Endpoint], separate: bool
+    analyses: Sequence[Analysis], ends: Sequence[Endpoint], *, separate: bool
 ) -> tuple[list[str], list[dict[str, Any]]]:
     """Return the names of the columns and a row for each fit."""
     rows = []
@@ -333,29 +273,21 @@ def _table(
             records = in_asked_forms(result.records(), ends)
             rows += [file | channel | record for record in records]
     names = list(dict.fromkeys(name for row in rows for name in row))
-    rows = [{name: row.get(name) for name in names} for row in rows]
-    return names, _shown(rows, form)
+    return names, [{name: row.get(name) for name in names} for row in rows]
 
 
-def _report(
-    analysis: Analysis, path: Path, ends: Sequence[Endpoint], *, separate: bool, logarithms: bool
-) -> dict[Path, bytes]:
-    from mdfconv.measured.report import report_files, report_of
+def _shown(rows: list[dict[str, Any]], form: Format) -> list[dict[str, Any]]:
+    """Return the records for the form: lists and nulls where they have a place, else text."""
+    if form in (Format.json, Format.table):
+        return rows
+    number = cell_text if form is Format.markdown else repr
 
-    names, rows = _table([analysis], Format.markdown, ends, separate)
-    if "specular" in names:
-        names = [name for name in names if name in _CHIEF + _SECOND]
-        names = [name for name in names if any(row[name] != "" for row in rows)]
-    texts = [{name: _cell(row[name]) for name in names} for row in rows]
-    line = join(["mdfconv", *sys.argv[1:]])
-    return report_files(report_of(analysis, texts, line, logarithms=logarithms), path)
+    def text(value: Any) -> Any:
+        if isinstance(value, list):
+            return " ".join(map(number, value))
+        return "" if value is None else value
 
-
-def _cell(value: Any) -> str:
-    """Return a cell of the report's table."""
-    if isinstance(value, bool):
-        return "yes" if value else ""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return [{name: text(value) for name, value in row.items()} for row in rows]
 
 
 def _tell(analysis: Analysis, tolerance: float, *, named: bool) -> None:
@@ -384,46 +316,12 @@ def _ends(names: Sequence[str]) -> list[Endpoint]:
 
 
 def _targets(ends: Sequence[Endpoint], gamma: float | None) -> list[Distribution]:
-    """Return the distributions to fit: of all those that a given γ leaves legal.
+    """Return the distributions to fit, and say which of all a given γ leaves out."""
+    from mdfconv.measured.analysis import fitted_distributions
 
-    Raises
-    ------
-    MdfconvError
-        If γ is given and means nothing for those that are named.
-    """
-    import numpy as np
-
-    from mdfconv.distributions import one_parameter_distributions
-
-    every = not ends
     named = list(dict.fromkeys(end.distribution for end in ends))
-    targets = named or one_parameter_distributions()
-    if gamma is None:
-        return targets
-    second = [target for target in targets if target.second_parameter]
-    if not second:
-        raise MdfconvError(f"{targets[0].name} has one parameter and no γ")
-    illegal = [
-        target
-        for target in second
-        if target.second_parameter and not target.second_parameter.accepts(np.asarray(gamma))
-    ]
-    if illegal and (not every or len(illegal) == len(second)):
-        illegal[0].with_gamma(gamma)  # says what is legal
-    for target in illegal:
-        tell(f"note: {target.name} is left out: it has no γ = {gamma:g}")
-    return [target for target in targets if target not in illegal]
-
-
-def _shown(rows: list[dict[str, Any]], form: Format) -> list[dict[str, Any]]:
-    """Return the records for the form: lists and nulls where they have a place, else text."""
-    if form in (Format.json, Format.table):
-        return rows
-    number = cell_text if form is Format.markdown else repr
-    return [{key: _text(value, number) for key, value in row.items()} for row in rows]
-
-
-def _text(value: Any, number: Callable[[float], str]) -> Any:
-    if isinstance(value, list):
-        return " ".join(map(number, value))
-    return "" if value is None else value
+    targets = fitted_distributions(named, gamma)
+    for mdf in () if named else fitted_distributions(None, None):
+        if mdf not in targets:
+            tell(f"note: {mdf.name} is left out: it has no γ = {gamma:g}")
+    return targets

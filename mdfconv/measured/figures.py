@@ -1,116 +1,135 @@
-"""The picture of fits to measurements of one angle: data, fits, and what they leave."""
+"""The pictures of fits to measurements: data, fits, and what they leave."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mdfconv.brdf.microfacet import polar_angle
 from mdfconv.distributions.evaluation import Array, Indices
-from mdfconv.measured.brdf_fit import BrdfFit
-from mdfconv.measured.lobe_fit import LobeFit
+from mdfconv.measured.analysis import Analysis, ChannelFits
+from mdfconv.measured.brdf_fit import MeasuredFit
 from mdfconv.measured.samples import DirectionalSamples, Samples
 from mdfconv.output.figures import PAGE, encoded, line_style, new_figure
 
-_POINTS = 600  # of a curve, one a pixel
+# Of a curve, one a pixel.
+_POINTS = 600
 # Side by side; pictures of more would be unreadable.
 _MOST_CHANNELS = 6
-
-
-def draw_fits(
-    panels: Sequence[tuple[Samples, Sequence[LobeFit], int]],
-    title: str,
-    *,
-    logarithms: bool = False,
-) -> bytes:
-    """Return a PNG of samples and fits, with the residuals beneath, a column for each panel.
-
-    Parameters
-    ----------
-    panels : sequence of (Samples, sequence of LobeFit, int)
-        The measurements, the fits to them, and which channel is drawn; of many the first six.
-    title : str
-        What was measured.
-    logarithms : bool
-        Whether the axis of values is logarithmic and the residuals are those of logarithms, as
-        those that the fit minimized.
-    """
-    panels = panels[:_MOST_CHANNELS]
-    figure = new_figure(PAGE[0] * (1 + 0.6 * (len(panels) - 1)), PAGE[1])
-    axes = figure.subplots(2, len(panels), sharex=True, height_ratios=(3, 2), squeeze=False)
-    for column, (data, fits, channel) in enumerate(panels):
-        upper, lower = axes[:, column]
-        _draw_channel(upper, lower, data, fits, channel, logarithms=logarithms)
-        named = f"{title}, {data.channels[channel]}"
-        upper.set_title(title if len(panels) == 1 else named)
-        upper.legend(fontsize=8 if len(panels) == 1 else 7)
-        lower.set_xlabel("β between normal and half vector [degrees]")
-    brdf = panels[0][0].quantity == "brdf"
-    axes[0, 0].set_ylabel("BRDF [1/sr]" if brdf else "distribution")
-    axes[1, 0].set_ylabel("ln(fit/data)" if logarithms else "fit − data")
-    return encoded(figure)
-
-
-def _draw_channel(
-    upper: Any,
-    lower: Any,
-    data: Samples,
-    fits: Sequence[LobeFit],
-    channel: int,
-    *,
-    logarithms: bool,
-) -> None:
-    degrees, values = np.degrees(data.beta), data.values[:, channel]
-    beta = np.linspace(data.beta[0], data.beta[-1], _POINTS)
-    upper.plot(degrees, values, "o", color="0.6", markersize=3, label="data")
-    for fit in fits:
-        style = line_style(fit.distribution.name)
-        fitted = fit.distribution.parameters[: len(fit.parameters)]
-        numbers = ", ".join(
-            f"{parameter.symbol} = {value:.4g}"
-            for parameter, value in zip(fitted, fit.parameters, strict=True)
-        )
-        curve, near = (fit.model(at, data.quantity)[:, channel] for at in (beta, data.beta))
-        label = f"{fit.distribution.name}, {numbers}"
-        upper.plot(np.degrees(beta), curve, label=label, **style)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            residual = np.log(near / values) if logarithms else near - values
-        lower.plot(degrees, residual, **style)
-    if logarithms:
-        upper.set_yscale("log", nonpositive="mask")
-
-
-# Angles of incidence that a picture can tell apart, and how near samples are one of them, degrees.
-_MOST_CURVES, _SAME_ANGLE = 8, 0.25
+# Angles of incidence that a picture can tell apart.
+_MOST_CURVES = 8
+# So near to each other two angles of incidence are one, degrees.
+_SAME_ANGLE = 0.25
 # So near the plane of incidence a sample belongs to the scan in it, degrees.
 _IN_PLANE = 3.0
+# Of a cloud, which more do not change.
 _MOST_POINTS = 4000
 
 
-def draw_directional(
-    panels: Sequence[tuple[DirectionalSamples, BrdfFit, int]],
-    title: str,
-    *,
-    logarithms: bool = False,
-) -> bytes:
-    """Return a PNG: f_r over the angle of reflection, on both axes, and the residuals.
+def draw_analysis(analysis: Analysis, *, logarithms: bool) -> bytes:
+    """Return a PNG of every channel and the fits to it.
 
-    Parameters
-    ----------
-    panels : sequence of (DirectionalSamples, BrdfFit, int)
-        The measurements, a fit to them, and which channel is drawn; a row each.
-    title : str
-        What was measured.
-    logarithms : bool
-        Whether residuals are of logarithms, as those that the fit minimized.
+    Residuals are of logarithms where the fit minimized those.
+    """
+    panels = [
+        (result, channel)
+        for result in analysis.results
+        for channel in range(len(result.samples.channels))
+    ]
+    if isinstance(analysis.samples, DirectionalSamples):
+        return _draw_directions(panels, analysis.name, logarithms=logarithms)
+    return _draw_slices(panels[:_MOST_CHANNELS], analysis.name, logarithms=logarithms)
+
+
+def draw_parts(analysis: Analysis, *, logarithms: bool) -> Iterator[tuple[str, bytes]]:
+    """Yield the pictures of a page by what they show.
+
+    One for each channel of two directions; of one angle all channels on linear and on logarithmic
+    axes.
+    """
+    if isinstance(analysis.samples, Samples):
+        for name, kind in (("linear", False), ("logarithmic", True)):
+            yield name, draw_analysis(analysis, logarithms=kind)
+        return
+    for result in analysis.results:
+        for channel, name in enumerate(result.samples.channels):
+            panel = [(result, channel)]
+            picture = _draw_directions(panel, analysis.name, logarithms=logarithms)
+            yield f"channel {name}", picture
+
+
+def _draw_slices(
+    panels: Sequence[tuple[ChannelFits, int]], title: str, *, logarithms: bool
+) -> bytes:
+    """Return a PNG with a column for each channel: data and fits, the residuals beneath."""
+    alone = len(panels) == 1
+    figure = new_figure(PAGE[0] * (1 + 0.6 * (len(panels) - 1)), PAGE[1])
+    axes = figure.subplots(2, len(panels), sharex=True, height_ratios=(3, 2), squeeze=False)
+    for (upper, lower), (result, channel) in zip(axes.T, panels, strict=True):
+        data = result.samples
+        assert isinstance(data, Samples)
+        degrees, values = np.degrees(data.beta), data.values[:, channel]
+        fine = replace(data, beta=np.linspace(data.beta[0], data.beta[-1], _POINTS))
+        upper.plot(degrees, values, "o", color="0.6", markersize=3, label="data")
+        for fit in result.fits:
+            style = line_style(fit.distribution.name)
+            curve = fit.model(fine)[:, channel]
+            upper.plot(np.degrees(fine.beta), curve, label=_label(fit), **style)
+            residual = _residual(fit.model(data)[:, channel], values, logarithms=logarithms)
+            lower.plot(degrees, residual, **style)
+        if logarithms:
+            upper.set_yscale("log", nonpositive="mask")
+        upper.set_title(title if alone else f"{title}, {data.channels[channel]}")
+        upper.legend(fontsize=8 if alone else 7)
+        lower.set_xlabel("β between normal and half vector [degrees]")
+        if upper is axes[0, 0]:
+            upper.set_ylabel("BRDF [1/sr]" if data.quantity == "brdf" else "distribution")
+            lower.set_ylabel("ln(fit/data)" if logarithms else "fit − data")
+    return encoded(figure)
+
+
+def _label(fit: MeasuredFit) -> str:
+    fitted = zip(fit.distribution.parameters, fit.parameters.values(), strict=False)
+    numbers = (f"{parameter.symbol} = {value:.4g}" for parameter, value in fitted)
+    return f"{fit.distribution.name}, {', '.join(numbers)}"
+
+
+def _residual(near: Array, values: Array, *, logarithms: bool) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.log(near / values) if logarithms else near - values
+
+
+def _draw_directions(
+    panels: Sequence[tuple[ChannelFits, int]], title: str, *, logarithms: bool
+) -> bytes:
+    """Return a PNG with a row for each channel and its best fit.
+
+    f_r over the angle of reflection on both axes, the residuals, and those over β.
     """
     figure = new_figure(PAGE[0] * 2, PAGE[1] * 0.62 * len(panels) + 0.4)
     axes = figure.subplots(len(panels), 4, squeeze=False)
-    for row, (data, fit, channel) in zip(axes, panels, strict=True):
-        _draw_row(row, data, fit, channel, logarithms=logarithms)
-        row[0].set(title=f"{title}, {data.channels[channel]}", ylabel="f_r [1/sr]")
+    for row, (result, channel) in zip(axes, panels, strict=True):
+        linear, logarithmic, residual, scatter = row
+        data, fit = result.samples, result.fits[0]
+        assert isinstance(data, DirectionalSamples)
+        values, near = data.values[:, channel], fit.model(data)[:, channel]
+        error = _residual(near, values, logarithms=logarithms)
+        for index, angle, color, label in _scans(data):
+            for panel in (linear, logarithmic):
+                panel.plot(angle, values[index], ".", color=color, markersize=3)
+                panel.plot(angle, near[index], "-", color=color, label=label)
+            residual.plot(angle, error[index], "-", color=color, linewidth=0.8)
+        some = np.linspace(0, values.size - 1, min(values.size, _MOST_POINTS)).astype(int)
+        half = np.degrees(polar_angle(data.half[some]))
+        scatter.plot(half, error[some], ".", color="0.3", markersize=2)
+        linear.set(title=f"{title}, {data.channels[channel]}", ylabel="f_r [1/sr]")
+        logarithmic.set(title=fit.distribution.label)
+        logarithmic.set_yscale("log", nonpositive="mask")
+        residual.set(title="ln(fit/data)" if logarithms else "fit − data [1/sr]")
+        scatter.set(title="the same over β, all samples")
     for panel in axes[-1, :3]:
         panel.set_xlabel("θ_o in the plane of incidence [degrees]")
     axes[-1, 3].set_xlabel("β of the half vector [degrees]")
@@ -119,67 +138,39 @@ def draw_directional(
     return encoded(figure, dpi=110)
 
 
-def _draw_row(
-    axes: Any, data: DirectionalSamples, fit: BrdfFit, channel: int, *, logarithms: bool
-) -> None:
-    linear, logarithmic, residual, scatter = axes
-    values, near = data.values[:, channel], fit.model(data)[:, channel]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        error = np.log(near / values) if logarithms else near - values
-    scan = _Scan(data)
-    for index, color, label in scan.curves():
-        angle = scan.signed[index]
-        for panel in (linear, logarithmic):
-            panel.plot(angle, values[index], ".", color=color, markersize=3)
-            panel.plot(angle, near[index], "-", color=color, label=label)
-        residual.plot(angle, error[index], "-", color=color, linewidth=0.8)
-    some = np.linspace(0, values.size - 1, min(values.size, _MOST_POINTS)).astype(int)
-    half = np.degrees(polar_angle(data.half[some]))
-    scatter.plot(half, error[some], ".", color="0.3", markersize=2)
-    logarithmic.set(title=fit.distribution.label)
-    logarithmic.set_yscale("log", nonpositive="mask")
-    residual.set(title="ln(fit/data)" if logarithms else "fit − data [1/sr]")
-    scatter.set(title="the same over β, all samples")
-
-
 def incidences(data: DirectionalSamples) -> Array:
     """Return the angles of incidence of samples, degrees, each once."""
+    angle, whole = _rounded_incidence(data)
+    return np.array([np.median(angle[np.abs(angle - a) <= _SAME_ANGLE]) for a in whole])
+
+
+def _rounded_incidence(data: DirectionalSamples) -> tuple[Array, Array]:
+    """Return the angle of incidence of each sample, and the different ones, in degrees."""
     angle = np.degrees(polar_angle(data.incident))
-    whole = np.unique(np.round(angle / _SAME_ANGLE)) * _SAME_ANGLE
-    found: Array = np.array([np.median(angle[np.abs(angle - a) <= _SAME_ANGLE]) for a in whole])
-    return found
+    return angle, np.unique(np.round(angle / _SAME_ANGLE)) * _SAME_ANGLE
 
 
-class _Scan:
-    """The samples in the plane of incidence, by their angles of incidence.
+def _scans(data: DirectionalSamples) -> Iterator[tuple[Indices, Array, Any, str]]:
+    """Yield the samples in the plane of incidence for some angles of incidence.
 
-    Attributes
-    ----------
-    signed : numpy.ndarray, shape (n,)
-        θ_o, degrees, positive on the side of the mirror direction.
+    Their indices in order, their θ_o in degrees, positive on the side of the mirror direction, a
+    colour and a label.
     """
+    from matplotlib import colormaps
 
-    def __init__(self, data: DirectionalSamples) -> None:
-        self._incidence = np.degrees(polar_angle(data.incident))
-        outgoing = np.degrees(polar_angle(data.outgoing))
-        (x, y), (u, v) = data.incident[:, :2].T, data.outgoing[:, :2].T
-        along, side = -(x * u + y * v), x * v - y * u
-        # Along the normal every plane is that of incidence.
-        away = np.degrees(np.arctan2(np.abs(side), np.abs(along)))
-        upright = np.minimum(self._incidence, outgoing) < _IN_PLANE
-        self._in_plane = (away < _IN_PLANE) | upright
-        self.signed = np.where(along >= 0, outgoing, -outgoing)
-
-    def curves(self) -> Iterator[tuple[Indices, Any, str]]:
-        """Yield samples in order, a colour and a label for each angle of incidence."""
-        from matplotlib import colormaps
-
-        whole = np.unique(np.round(self._incidence / _SAME_ANGLE)) * _SAME_ANGLE
-        if whole.size > _MOST_CURVES:
-            whole = whole[np.linspace(0, whole.size - 1, _MOST_CURVES).astype(int)]
-        for number, angle in enumerate(whole):
-            near = np.abs(self._incidence - angle) < _SAME_ANGLE
-            index = np.flatnonzero(near & self._in_plane)
-            index = index[np.argsort(self.signed[index], kind="stable")]
-            color = colormaps["viridis"](0.9 * number / max(1, whole.size - 1))
-            yield index, color, f"θ_i {angle:.3g}°"
+    incidence, whole = _rounded_incidence(data)
+    outgoing = np.degrees(polar_angle(data.outgoing))
+    (x, y), (u, v) = data.incident[:, :2].T, data.outgoing[:, :2].T
+    along, side = -(x * u + y * v), x * v - y * u
+    signed = np.where(along >= 0, outgoing, -outgoing)
+    away = np.degrees(np.arctan2(np.abs(side), np.abs(along)))
+    # Along the normal every plane is that of incidence.
+    is_upright = np.minimum(incidence, outgoing) < _IN_PLANE
+    is_in_plane = (away < _IN_PLANE) | is_upright
+    if whole.size > _MOST_CURVES:
+        whole = whole[np.linspace(0, whole.size - 1, _MOST_CURVES).astype(int)]
+    for number, angle in enumerate(whole):
+        index = np.flatnonzero((np.abs(incidence - angle) < _SAME_ANGLE) & is_in_plane)
+        index = index[np.argsort(signed[index], kind="stable")]
+        color = colormaps["viridis"](0.9 * number / max(1, whole.size - 1))
+        yield index, signed[index], color, f"θ_i {angle:.3g}°"

@@ -7,7 +7,8 @@ the same linear step is iterated.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,45 +16,37 @@ from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 
 # Gauss-Newton steps for the logarithms: at the right parameter six are exact under 50 % of noise.
-_LOG_STEPS, _LOG_TOLERANCE = 12, 1e-11
+_LOG_STEPS = 12
+_LOG_TOLERANCE = 1e-11
 # Of the largest sample: what is smaller has no weight 1/value² in double precision.
 _SMALLEST_LOGARITHM = 1e-100
 # Of the smallest sample, under the logarithmic loss: a model is kept positive, far from where a
 # fit ends.
 _SMALLEST_MODEL = 1e-3
+# Rows of a Jacobian that are held at a time.
+_BLOCK = 65536
+
+
+class Projected(NamedTuple):
+    """What a lobe leaves: residuals, ∂residual/∂model, and the best offsets and scales."""
+
+    residual: Array
+    gain: Array
+    offset: Array
+    scale: Array
 
 
 class Projection:
     """The best offset and scale of each channel, for any lobe.
 
-    Parameters
-    ----------
-    values : numpy.ndarray, shape (n, channels)
-        What the model is to be; positive for logarithms.
-    log : bool
-        Whether the residuals are those of the logarithms.
-    weight : numpy.ndarray, shape (n, 1), optional
-        Of the squared residuals; 1 if not given.
-    floor : bool
-        Whether an offset is at least 0.
-
-    Raises
-    ------
-    MdfconvError
-        If there are logarithms of values that are too far apart.
+    Values and weights have shape (n, channels), values are positive for logarithms; `floor` keeps
+    offsets from being negative. Raises `MdfconvError` for logarithms of values that are too far
+    apart.
     """
 
-    def __init__(
-        self,
-        values: Array,
-        *,
-        log: bool = False,
-        weight: Array | None = None,
-        floor: bool = False,
-    ) -> None:
-        self.values, self._log, self._floor = values, log, floor
-        self._weight = np.ones_like(values) if weight is None else weight * np.ones_like(values)
-        self._root = np.sqrt(self._weight)
+    def __init__(self, values: Array, weight: Array, *, log: bool, floor: bool) -> None:
+        self._values, self._weight, self._log, self._floor = values, weight, log, floor
+        self._root = np.sqrt(weight)
         if log and values.min() <= _SMALLEST_LOGARITHM * values.max():
             raise MdfconvError(
                 "the smallest value is less than 1e-100 of the largest: no loss of logarithms "
@@ -61,46 +54,24 @@ class Projection:
                 "leave out what is no measurement, or take the linear loss",
             )
 
-    def __call__(self, lobe: Array) -> tuple[Array, Array, Array, Array]:
-        """Return residuals, their gain ∂residual/∂model, offsets and scales.
-
-        A lobe has shape (..., n), residuals and gain (..., n, channels), the others
-        (..., channels).
-        """
-        values, root = self.values, self._root
+    def __call__(self, lobe: Array) -> Projected:
+        """Project lobes of shape (..., n): residuals and gain are (..., n, channels)."""
+        values, root = self._values, self._root
         if not self._log:
             offset, scale = self._solve(lobe, values, self._weight)
-            return root * (model(lobe, offset, scale) - values), root, offset, scale
+            return Projected(root * (model(lobe, offset, scale) - values), root, offset, scale)
         smallest = _SMALLEST_MODEL * values.min(axis=0)
         offset, scale = self._solve(lobe, values, self._weight / np.square(values))
         for _ in range(_LOG_STEPS):
             near = np.maximum(model(lobe, offset, scale), smallest)
             # One Gauss-Newton step for the logarithms is a weighted linear fit.
             working = near * (1 + np.log(values / near))
-            last, (offset, scale) = (
-                (offset, scale),
-                self._solve(lobe, working, self._weight / np.square(near)),
-            )
+            last = offset, scale
+            offset, scale = self._solve(lobe, working, self._weight / np.square(near))
             if np.allclose(last, (offset, scale), rtol=_LOG_TOLERANCE, atol=0):
                 break
         near = np.maximum(model(lobe, offset, scale), smallest)
-        return root * np.log(near / values), root / near, offset, scale
-
-    def slope(self, lobe: Array, slopes: list[Array]) -> Array:
-        """Return ∂residual/∂parameter with the linear part projected out (Kaufman 1975).
-
-        Parameters
-        ----------
-        lobe : numpy.ndarray, shape (n,)
-            The lobe.
-        slopes : list of numpy.ndarray, shape (n,)
-            Its slopes in each parameter.
-
-        Returns
-        -------
-        numpy.ndarray, shape (n · channels, parameters)
-        """
-        return projected_slope(lobe, slopes, *self(lobe)[1::2])
+        return Projected(root * np.log(near / values), root / near, offset, scale)
 
     def _solve(self, lobe: Array, values: Array, weight: Array) -> tuple[Array, Array]:
         """Return weighted least-squares offset and scale ≥ 0 of each channel."""
@@ -120,8 +91,16 @@ class Projection:
         return offset, scale
 
 
+def model(lobe: Array, offset: Array, scale: Array) -> Array:
+    """Return offset + scale · lobe, shape (..., n, channels)."""
+    return offset[..., None, :] + lobe[..., None] * scale[..., None, :]
+
+
 def projected_slope(lobe: Array, slopes: list[Array], gain: Array, scale: Array) -> Array:
-    """Return ∂residual/∂parameter of a model with the given gain and scale, as `Projection`."""
+    """Return ∂residual/∂parameter with the linear part projected out (Kaufman 1975).
+
+    Lobe and slopes have shape (n,), gain (n, channels); the result is (n · channels, parameters).
+    """
     columns = []
     for slope in slopes:
         moved = slope[:, None] * scale
@@ -130,9 +109,23 @@ def projected_slope(lobe: Array, slopes: list[Array], gain: Array, scale: Array)
     return np.stack(columns, axis=1)
 
 
-def model(lobe: Array, offset: Array, scale: Array) -> Array:
-    """Return offset + scale · lobe, shape (..., n, channels)."""
-    return offset[..., None, :] + lobe[..., None] * scale[..., None, :]
+def jacobian(lobe: Array, slopes: list[Array], gain: Array, scale: Array) -> Iterator[Array]:
+    """Yield blocks, shape (rows, channels, unknowns), of the slopes of the residuals.
+
+    The unknowns are the lobe's parameters, then offset and scale of each channel.
+    """
+    channels = scale.size
+    for start in range(0, lobe.size, _BLOCK):
+        rows = slice(start, start + _BLOCK)
+        part = gain[rows]
+        block = np.zeros((*part.shape, len(slopes) + 2 * channels))
+        for column, slope in enumerate(slopes):
+            block[:, :, column] = part * slope[rows, None] * scale
+        for channel in range(channels):
+            first = len(slopes) + 2 * channel
+            block[:, channel, first] = part[:, channel]
+            block[:, channel, first + 1] = part[:, channel] * lobe[rows]
+        yield block
 
 
 def upper_triangle(blocks: Iterable[Array]) -> Array:
@@ -151,15 +144,6 @@ def standard_deviations(jacobian: Array) -> Array:
     singular = np.maximum(singular, np.finfo(float).tiny)
     deviations: Array = np.linalg.norm(basis / singular[:, None], axis=0) / norms
     return deviations
-
-
-def log_rmse(near: Array, values: Array) -> float:
-    """Return the root mean square of ln(model/value) where both are positive, else NaN."""
-    positive = (near > 0) & (values > 0)
-    if not positive.any():
-        return float("nan")
-    ratio = np.log(near[positive] / values[positive])
-    return float(np.sqrt(np.mean(np.square(ratio))))
 
 
 def _regression(lobe: Array, values: Array, weight: Array) -> tuple[Array, Array]:

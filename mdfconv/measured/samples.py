@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -35,83 +36,11 @@ class Samples:
     values: Array
     channels: tuple[str, ...]
     quantity: str
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
 
-
-@dataclass(frozen=True)
-class AngleUnit:
-    """How a file stores an angle.
-
-    Parameters
-    ----------
-    to_radians : callable
-        From the number stored.
-    largest : float
-        The largest such number; the smallest is 0.
-    """
-
-    to_radians: Callable[[Array], Array]
-    largest: float
-
-
-UNITS = {
-    "degrees": AngleUnit(np.radians, 90.0),
-    "radians": AngleUnit(np.asarray, np.pi / 2),
-    "cosine": AngleUnit(np.arccos, 1.0),
-}
-# Of the largest number of a unit: files hold rounded angles.
-_SLACK = 1e-6
-
-
-def samples(
-    path: Path,
-    angle: Array,
-    unit: str,
-    values: Array,
-    channels: tuple[str, ...],
-    quantity: str,
-    notes: tuple[str, ...] = (),
-) -> Samples:
-    """Return samples in order, without their NaN rows, or say what is wrong with them.
-
-    Parameters
-    ----------
-    path : Path
-        The file, for messages.
-    angle : numpy.ndarray, shape (n,)
-        Angles as stored.
-    unit : str
-        One of `UNITS`.
-    values, channels, quantity, notes
-        As in `Samples`.
-
-    Raises
-    ------
-    MdfconvError
-        If an angle is outside [0, π/2] or no row is left.
-    """
-    whole = np.isfinite(angle) & np.isfinite(values).all(axis=1)
-    dropped = int(np.count_nonzero(~whole))
-    if dropped:
-        notes = (*notes, f"{dropped} of {whole.size} rows hold NaN or infinity and are left out")
-    if not whole.any():
-        raise MdfconvError(f"{path}: no row with finite numbers")
-    angle, values = angle[whole], values[whole]
-    largest = UNITS[unit].largest
-    outside = (angle < -_SLACK * largest) | (angle > (1 + _SLACK) * largest)
-    if outside.any():
-        bad = float(angle[outside][0])
-        raise MdfconvError(
-            f"{path}: {unit} {bad:g} is outside 0 to {largest:.6g}, an angle from the normal to "
-            "the horizon"
-        )
-    beta = UNITS[unit].to_radians(np.clip(angle, 0, largest))
-    order = np.argsort(beta, kind="stable")
-    return Samples(beta[order], values[order], channels, quantity, notes)
-
-
-# Files hold rounded angles: a direction is on the horizon within this, radians.
-_HORIZON = 1e-6
+    def select(self, rows: Any) -> Samples:
+        """Return some of the samples, by a mask or by indices."""
+        return replace(self, beta=self.beta[rows], values=self.values[rows])
 
 
 @dataclass(frozen=True)
@@ -134,16 +63,81 @@ class DirectionalSamples:
     outgoing: Array
     values: Array
     channels: tuple[str, ...]
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
 
     @property
     def half(self) -> Array:
         """The half vectors, shape (n, 3)."""
         return half_vector(self.incident, self.outgoing)
 
+    def select(self, rows: Any) -> DirectionalSamples:
+        """Return some of the samples, by a mask or by indices."""
+        return replace(
+            self,
+            incident=self.incident[rows],
+            outgoing=self.outgoing[rows],
+            values=self.values[rows],
+        )
+
+
+Measurements: TypeAlias = Samples | DirectionalSamples
+
+
+@dataclass(frozen=True)
+class AngleUnit:
+    """How a file stores an angle: the rule to radians, and the largest number; the least is 0."""
+
+    to_radians: Callable[[Array], Array]
+    largest: float
+
+
+UNITS = {
+    "degrees": AngleUnit(np.radians, 90.0),
+    "radians": AngleUnit(np.asarray, np.pi / 2),
+    "cosine": AngleUnit(np.arccos, 1.0),
+}
+# Files hold rounded angles: of the largest number of a unit, and radians from the horizon.
+_SLACK = 1e-6
+_HORIZON = 1e-6
+
+
+def samples(
+    path: Path,
+    angle: Array,
+    unit: str,
+    values: Array,
+    channels: tuple[str, ...],
+    quantity: str,
+    notes: tuple[str, ...] = (),
+) -> Samples:
+    """Return samples of one angle, stored in one of `UNITS`, in order and without NaN rows.
+
+    Raises `MdfconvError`, which names the path, if an angle is outside [0, π/2], no row is left, or
+    the shapes do not go together.
+    """
+    _check_shapes(path, [angle], values, channels)
+    whole = np.isfinite(angle) & np.isfinite(values).all(axis=1)
+    dropped = int(np.count_nonzero(~whole))
+    if dropped:
+        notes = (*notes, f"{dropped} of {whole.size} rows hold NaN or infinity and are left out")
+    if not whole.any():
+        raise MdfconvError(f"{path}: no row with finite numbers")
+    angle, values = angle[whole], values[whole]
+    largest = UNITS[unit].largest
+    outside = (angle < -_SLACK * largest) | (angle > (1 + _SLACK) * largest)
+    if outside.any():
+        bad = float(angle[outside][0])
+        raise MdfconvError(
+            f"{path}: {unit} {bad:g} is outside 0 to {largest:.6g}, an angle from the normal to "
+            "the horizon"
+        )
+    beta = UNITS[unit].to_radians(np.clip(angle, 0, largest))
+    order = np.argsort(beta, kind="stable")
+    return Samples(beta[order], values[order], channels, quantity, notes)
+
 
 def directional_samples(
-    path: Path,
+    path: Path | str,
     theta_incident: Array,
     phi_incident: Array,
     theta_outgoing: Array,
@@ -156,7 +150,7 @@ def directional_samples(
 
     Parameters
     ----------
-    path : Path
+    path : Path or str
         The file, for messages.
     theta_incident, phi_incident, theta_outgoing, phi_outgoing : numpy.ndarray, shape (n,)
         Zenith and azimuth of the two directions, radians. A negative zenith is that of the
@@ -167,12 +161,28 @@ def directional_samples(
     channels, notes
         As in `DirectionalSamples`.
 
+    Returns
+    -------
+    DirectionalSamples
+        The samples that are finite and above the horizon; a note says how many are not.
+
     Raises
     ------
     MdfconvError
-        If no sample is left that is finite and above the horizon.
+        If no sample is left, or the shapes do not go together.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> theta = np.radians([0.0, 15.0, 30.0])
+    >>> samples = directional_samples(
+    ...     "scan", theta, 0 * theta, theta, 0 * theta + np.pi, np.ones((3, 1)), ("green",)
+    ... )
+    >>> samples.half[:, 2].round(12)
+    array([1., 1., 1.])
     """
     angles = (theta_incident, phi_incident, theta_outgoing, phi_outgoing)
+    _check_shapes(path, angles, values, channels)
     finite = np.isfinite(values).all(axis=1) & np.isfinite(np.stack(angles)).all(axis=0)
     largest = 0.5 * np.pi - _HORIZON
     above = (np.abs(theta_incident) < largest) & (np.abs(theta_outgoing) < largest)
@@ -190,3 +200,15 @@ def directional_samples(
         channels,
         notes,
     )
+
+
+def _check_shapes(
+    path: Path | str, angles: Sequence[Array], values: Array, channels: Sequence[str]
+) -> None:
+    """Raise unless there is a row for each angle and a column of values for each channel."""
+    shape = len(angles[0]), len(channels)
+    if values.shape != shape or any(angle.shape != shape[:1] for angle in angles):
+        raise MdfconvError(
+            f"{path}: values of shape {values.shape} where {shape[0]} angles and the channels "
+            f"{', '.join(channels)} make {shape}"
+        )

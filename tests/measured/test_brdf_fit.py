@@ -11,7 +11,7 @@ from mdfconv.brdf.microfacet import Microsurface
 from mdfconv.distributions import one_parameter_distributions
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.analysis import rank
-from mdfconv.measured.brdf_fit import BrdfModel, fit_brdf
+from mdfconv.measured.brdf_fit import BrdfModel, fit_distribution
 from mdfconv.measured.samples import directional_samples
 
 INCIDENCES = np.radians([5, 15, 25, 35, 45, 55, 62, 68])
@@ -81,14 +81,14 @@ def gamma_of(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_exact_data_come_back(name, loss):
     data = measured(np.random.default_rng(1), name, noise=0, **gamma_of(name))
-    found = fit_brdf(data, mdfconv.distribution(name), BrdfModel(loss=loss))
+    found = fit_distribution(data, mdfconv.distribution(name), BrdfModel(loss=loss))
     assert found.parameters[mdfconv.distribution(name).parameter.name] == pytest.approx(
         TRUTH[name], rel=1e-4
     )
     if gamma_of(name):
         assert found.parameters["gamma"] == pytest.approx(3, rel=1e-3)
-    assert found.diffuse[0] == pytest.approx(0.3, rel=1e-4)
-    assert found.specular[0] == pytest.approx(0.8, rel=1e-3)
+    assert found.linear["diffuse"][0] == pytest.approx(0.3, rel=1e-4)
+    assert found.linear["specular"][0] == pytest.approx(0.8, rel=1e-3)
     assert found.error < 1e-4
     np.testing.assert_allclose(found.model(data), data.values, rtol=1e-3)
     assert found.masking == ("smith" if name in SMITH else "v-cavity")
@@ -100,14 +100,14 @@ def test_truth_within_three_standard_errors(name):
     for seed in range(20):
         rng = np.random.default_rng(seed)
         data = measured(rng, name, diffuse=(0.3, 0.1), specular=(0.8, 0.5), **gamma_of(name))
-        found = fit_brdf(data, mdfconv.distribution(name), BrdfModel(loss="log"))
+        found = fit_distribution(data, mdfconv.distribution(name), BrdfModel(loss="log"))
         wanted = {mdfconv.distribution(name).parameter.name: TRUTH[name], **gamma_of(name)}
         deviations += [
             abs(found.parameters[key] - truth) / found.errors[key] for key, truth in wanted.items()
         ]
         for values, errors, truth in (
-            (found.diffuse, found.diffuse_errors, (0.3, 0.1)),
-            (found.specular, found.specular_errors, (0.8, 0.5)),
+            (found.linear["diffuse"], found.linear_errors["diffuse"], (0.3, 0.1)),
+            (found.linear["specular"], found.linear_errors["specular"], (0.8, 0.5)),
         ):
             deviations += (np.abs(np.subtract(values, truth)) / errors).tolist()
     deviations = np.array(deviations)
@@ -120,7 +120,9 @@ def test_reflectance_comes_back_with_its_error():
     deviations = []
     for seed in range(20):
         data = measured(np.random.default_rng(seed), "ggx", reflectance=0.3)
-        found = fit_brdf(data, mdfconv.distribution("ggx"), BrdfModel(loss="log", fresnel="fit"))
+        found = fit_distribution(
+            data, mdfconv.distribution("ggx"), BrdfModel(loss="log", fresnel="fit")
+        )
         deviations.append(abs(found.parameters["reflectance"] - 0.3) / found.errors["reflectance"])
         assert not found.notes
     assert max(deviations) < 4
@@ -131,14 +133,16 @@ def test_one_angle_of_incidence_does_not_tell_the_reflectance():
     data = directions(rng, 60, INCIDENCES[2:3])
     values = 0.1 + brdf(data, "ggx", 0.2, reflectance=0.3)
     data = replace(data, values=(values * (1 + 0.01 * rng.standard_normal(values.size)))[:, None])
-    found = fit_brdf(data, mdfconv.distribution("ggx"), BrdfModel(loss="log", fresnel="fit"))
+    found = fit_distribution(
+        data, mdfconv.distribution("ggx"), BrdfModel(loss="log", fresnel="fit")
+    )
     assert found.notes == ("the data do not tell reflectance and specular apart",)
 
 
 @pytest.mark.parametrize("masking", ["v-cavity", "none"])
 def test_masking(masking):
     data = measured(np.random.default_rng(5), "ggx", noise=0, masking=masking)
-    found = fit_brdf(data, mdfconv.distribution("ggx"), BrdfModel(masking=masking))
+    found = fit_distribution(data, mdfconv.distribution("ggx"), BrdfModel(masking=masking))
     assert found.parameters["alpha"] == pytest.approx(0.2, rel=1e-5)
     assert found.masking == masking
 
@@ -148,9 +152,9 @@ def test_masking(masking):
 )
 def test_fresnel(fresnel, made):
     data = measured(np.random.default_rng(5), "ggx", noise=0, **made)
-    found = fit_brdf(data, mdfconv.distribution("ggx"), BrdfModel(fresnel=fresnel))
+    found = fit_distribution(data, mdfconv.distribution("ggx"), BrdfModel(fresnel=fresnel))
     assert found.parameters["alpha"] == pytest.approx(0.2, rel=1e-4)
-    assert found.specular[0] == pytest.approx(0.8, rel=1e-3)
+    assert found.linear["specular"][0] == pytest.approx(0.8, rel=1e-3)
 
 
 def test_outliers():
@@ -160,7 +164,8 @@ def test_outliers():
     data = replace(data, values=values)
     beckmann = mdfconv.distribution("beckmann")
     plain, robust = (
-        fit_brdf(data, beckmann, BrdfModel(loss="log", robust=robust)) for robust in (False, True)
+        fit_distribution(data, beckmann, BrdfModel(loss="log", robust=robust))
+        for robust in (False, True)
     )
     assert abs(robust.parameters["alpha"] - 0.2) < 0.5 * abs(plain.parameters["alpha"] - 0.2)
     assert robust.parameters["alpha"] == pytest.approx(0.2, rel=2e-3)
@@ -168,7 +173,9 @@ def test_outliers():
 
 def test_the_model_of_the_data_ranks_first():
     data = measured(np.random.default_rng(7), "sawicki", count=30)
-    fits = [fit_brdf(data, mdf, BrdfModel(loss="log")) for mdf in one_parameter_distributions()]
+    fits = [
+        fit_distribution(data, mdf, BrdfModel(loss="log")) for mdf in one_parameter_distributions()
+    ]
     ranked = rank(fits)
     assert ranked[0].distribution.name == "sawicki"
     assert ranked[0].aic == min(fit.aic for fit in fits)
@@ -177,9 +184,9 @@ def test_the_model_of_the_data_ranks_first():
 def test_many_samples_are_fitted_as_all_of_them():
     """More than those from which a fit starts."""
     data = measured(np.random.default_rng(8), "ggx", count=4000)
-    found = fit_brdf(data, mdfconv.distribution("beckmann"), BrdfModel(loss="log"))
+    found = fit_distribution(data, mdfconv.distribution("beckmann"), BrdfModel(loss="log"))
     half = np.random.default_rng(1).random(len(data.values)) < 0.5
-    part = fit_brdf(
+    part = fit_distribution(
         replace(
             data,
             incident=data.incident[half],
@@ -219,13 +226,13 @@ def log_error(data, mdf, alpha):
 def test_nothing_to_fit(change, message):
     data = measured(np.random.default_rng(9), "ggx", diffuse=(0.01,), noise=0)
     with pytest.raises(MdfconvError, match=message):
-        fit_brdf(replace(data, values=change(data.values)), mdfconv.distribution("ggx"))
+        fit_distribution(replace(data, values=change(data.values)), mdfconv.distribution("ggx"))
 
 
 def test_too_few_samples():
     data = directions(np.random.default_rng(1), 1, INCIDENCES[:3])
     with pytest.raises(MdfconvError, match="3 values are too few to fit 3 unknowns of ggx"):
-        fit_brdf(data, mdfconv.distribution("ggx"))
+        fit_distribution(data, mdfconv.distribution("ggx"))
 
 
 @pytest.mark.parametrize(

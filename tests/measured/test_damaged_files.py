@@ -1,12 +1,15 @@
 """Files of arbitrary bytes, and damaged ones of every format: an error, or samples that hold."""
 
+import struct
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.readers import ReadOptions, read
+from mdfconv.measured.readers import READERS, Reader, ReadOptions, Source, read
 from mdfconv.measured.readers.merl import read_merl_directional
 from mdfconv.measured.samples import DirectionalSamples
 from tests.measured.scans import grid, measured, merl_bytes, rows, tensor_bytes
@@ -44,9 +47,13 @@ def check_message(message):
 
 
 def check(path, options=None):
-    """Read a file; whatever comes back has to be what it promises to be."""
+    check_result(lambda: read(path, options))
+
+
+def check_result(reading):
+    """Read something; whatever comes back has to be what it promises to be."""
     try:
-        samples = read(path, options)
+        samples = reading()
     except MdfconvError as error:
         check_message(str(error))
         return
@@ -115,3 +122,43 @@ def test_damaged_merl_as_a_whole(tmp_path, place, byte):
         check_message(str(error))
         return
     assert np.isfinite(samples.values).all()
+
+
+def of_format(reader):
+    """Return the files above that a reader of the registry is the first to recognize."""
+    return [
+        content
+        for content in FILES.values()
+        if next(r for r in READERS if r.recognizes("a.txt", content[:65536])) is reader
+    ]
+
+
+@pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.name)
+def test_every_reader_of_what_is_cut_off_or_garbage(reader):
+    own = of_format(reader)
+    assert own, f"a file of the format {reader.name} belongs into FILES"
+    rng = np.random.default_rng(7)
+    damaged = [b"", bytes(range(256)), rng.bytes(300), *FILES.values()]
+    for content in own:
+        damaged += [content[:end] for end in np.linspace(0, len(content), 40).astype(int)]
+        for place in np.linspace(0, min(len(content), 400), 40).astype(int):
+            damaged.append(content[:place] + rng.bytes(8) + content[place + 8 :])
+    for content in damaged:
+        source = Source(Path("a.txt"), content)
+        check_result(lambda source=source: reader.samples(source, ReadOptions()))
+
+
+@pytest.mark.parametrize(
+    "error",
+    [KeyError("ndf"), IndexError("of 3"), ValueError("no\nnumber"), struct.error("short"),
+     UnicodeDecodeError("utf-8", b"a", 0, 1, "bad")],
+)  # fmt: skip
+def test_what_a_reader_does_not_foresee_is_an_error_of_the_file(error):
+    def fail(source, options):
+        raise error
+
+    reader = Reader("goniometer", lambda name, head: True, fail)
+    with pytest.raises(MdfconvError, match=r"cannot read a\.txt as goniometer: ") as caught:
+        reader.samples(Source(Path("a.txt"), b""), ReadOptions())
+    check_message(str(caught.value))
+    assert caught.value.__cause__ is error

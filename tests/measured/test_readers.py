@@ -9,7 +9,14 @@ import pytest
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers import ReadOptions, list_readers, read
 from mdfconv.measured.readers.merl import read_merl, read_merl_directional
-from mdfconv.measured.samples import DirectionalSamples, Samples
+from mdfconv.measured.samples import (
+    DirectionalSamples,
+    Samples,
+    directional_samples,
+)
+from mdfconv.measured.samples import (
+    samples as one_angle_samples,
+)
 from tests.cli.runner import run
 from tests.measured.scans import (
     ggx,
@@ -204,6 +211,15 @@ def test_channels_and_what_is_not_read(tmp_path):
     assert_same(samples, INCIDENT, OUTGOING, np.outer(VALUES, [1, 2, 3]))
     assert "column 'index' counts the rows and is passed over" in samples.notes
     assert any("not read: column 'stddev'" in note for note in samples.notes)
+
+
+@pytest.mark.parametrize("shape", [(400, 2), (400,), (399, 1)])
+def test_values_have_a_column_for_each_channel_and_a_row_for_each_angle(shape):
+    zero, values = np.zeros(400), np.ones(shape)
+    with pytest.raises(MdfconvError, match=r"a\.txt: values of shape .* 400 angles"):
+        directional_samples("a.txt", zero, zero, zero, zero, values, ("value",))
+    with pytest.raises(MdfconvError, match="values of shape"):
+        one_angle_samples("a.txt", zero, "radians", values, ("value",), "ndf")
 
 
 # Tables of one angle

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, open_source
-from mdfconv.measured.samples import DirectionalSamples, Samples
+from mdfconv.measured.samples import Measurements
 
-__all__ = ["ReadOptions", "Reader", "Source", "list_readers", "read"]
+__all__ = ["READERS", "ReadOptions", "Reader", "Source", "list_readers", "read"]
 
 # In the order in which they are asked: text reads what no other one knows.
 _MODULES = ("merl", "rgl", "alta", "zemax", "fred", "astm", "text")
@@ -20,17 +20,17 @@ _MODULES = ("merl", "rgl", "alta", "zemax", "fred", "astm", "text")
 # The format whose cells can be chosen.
 _WITH_CELLS = "MERL"
 
-_READERS: tuple[Reader, ...] = tuple(
+READERS: tuple[Reader, ...] = tuple(
     import_module(f"{__name__}.{module}").READER for module in _MODULES
 )
 
 
 def list_readers() -> list[str]:
     """Return the names of the formats, in the order in which a file is tried."""
-    return [reader.name for reader in _READERS]
+    return [reader.name for reader in READERS]
 
 
-def read(path: Path | str, options: ReadOptions | None = None) -> Samples | DirectionalSamples:
+def read(path: Path | str, options: ReadOptions | None = None) -> Measurements:
     """Read measurements, whatever format they are in.
 
     Parameters
@@ -49,13 +49,18 @@ def read(path: Path | str, options: ReadOptions | None = None) -> Samples | Dire
     ------
     MdfconvError
         If the file cannot be read, is damaged, or leaves open what its numbers mean.
+
+    Examples
+    --------
+    >>> from mdfconv.measured import ReadOptions, read
+    >>> samples = read("scan.csv", ReadOptions(theta_i="2", unit="degrees"))  # doctest: +SKIP
     """
     try:
         source = open_source(path)
     except OSError as error:
         raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
     options = options or ReadOptions()
-    reader = next(reader for reader in _READERS if reader.recognizes(source.path.name, source.head))
+    reader = next(reader for reader in READERS if reader.recognizes(source.path.name, source.head))
     if options.cells is not None and reader.name != _WITH_CELLS:
         raise MdfconvError(f"{source.path}: cells are those of a {_WITH_CELLS} file")
-    return reader.read(source, options)
+    return reader.samples(source, options)

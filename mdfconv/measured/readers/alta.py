@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mdfconv.brdf.microfacet import azimuth, direction, polar_angle
+from mdfconv.brdf.microfacet import direction
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers.base import (
@@ -22,9 +22,10 @@ from mdfconv.measured.readers.base import (
     decode,
     decode_head,
     from_half_and_difference,
+    samples_of_vectors,
 )
 from mdfconv.measured.readers.tables import parse_table
-from mdfconv.measured.samples import DirectionalSamples, Samples, directional_samples, samples
+from mdfconv.measured.samples import Measurements, samples
 
 _TAG = re.compile(r"^#[ \t]*([A-Z_]+)[ \t]+([^\n]*?)\s*$", re.M)
 _DIMENSIONS = re.compile(r"^#\s*DIM\s+\S", re.M)
@@ -35,31 +36,23 @@ _WEIGHTED = "INV_STERADIAN_COSINE_FACTOR"
 _PLAIN = ("INV_STERADIAN", "RGB_COLOR")
 
 
-def _projected(x: Array) -> tuple[Array, Array]:
-    zero = np.zeros(len(x))
-    view = direction(np.hypot(x[:, 1], x[:, 2]), np.arctan2(x[:, 2], x[:, 1]))
-    return direction(x[:, 0], zero), view
+def _projected(theta: Array, x: Array, y: Array) -> tuple[Array, Array]:
+    return direction(theta), direction(np.hypot(x, y), np.arctan2(y, x))
 
 
-def _half_and_difference(x: Array) -> tuple[Array, Array]:
-    view, light = from_half_and_difference(x[:, 0], x[:, 1], x[:, 2], x[:, 3])
+def _half_and_difference(*angles: Array) -> tuple[Array, Array]:
+    view, light = from_half_and_difference(*angles)
     return light, view
 
 
-# Of the inputs, one row a sample: light and view, and how many inputs there are.
-_TWO_DIRECTIONS: dict[str, tuple[int, Callable[[Array], tuple[Array, Array]]]] = {
+# How many inputs there are, and light and view of them.
+_TWO_DIRECTIONS: dict[str, tuple[int, Callable[..., tuple[Array, Array]]]] = {
     "ISOTROPIC_TL_TV_PROJ_DPHI": (3, _projected),
-    "ISOTROPIC_TV_TL_DPHI": (
-        3,
-        lambda x: (direction(x[:, 1], x[:, 2]), direction(x[:, 0], np.zeros(len(x)))),
-    ),
-    "SPHERICAL_TL_PL_TV_PV": (
-        4,
-        lambda x: (direction(x[:, 0], x[:, 1]), direction(x[:, 2], x[:, 3])),
-    ),
-    "RUSIN_TH_TD_PD": (3, lambda x: _half_and_difference(np.insert(x, 1, 0, axis=1))),
+    "ISOTROPIC_TV_TL_DPHI": (3, lambda tv, tl, dphi: (direction(tl, dphi), direction(tv))),
+    "SPHERICAL_TL_PL_TV_PV": (4, lambda tl, pl, tv, pv: (direction(tl, pl), direction(tv, pv))),
+    "RUSIN_TH_TD_PD": (3, lambda th, td, pd: _half_and_difference(th, 0 * th, td, pd)),
     "RUSIN_TH_PH_TD_PD": (4, _half_and_difference),
-    "CARTESIAN": (6, lambda x: (x[:, 3:], x[:, :3])),
+    "CARTESIAN": (6, lambda *xyz: (np.stack(xyz[3:], -1), np.stack(xyz[:3], -1))),
 }
 
 
@@ -67,7 +60,7 @@ def _recognizes(name: str, head: bytes) -> bool:
     return bool(_DIMENSIONS.search(decode_head(head)))
 
 
-def _read(source: Source, options: ReadOptions) -> Samples | DirectionalSamples:
+def _read(source: Source, options: ReadOptions) -> Measurements:
     path = source.path
     options.refuse(path, "ALTA's header names its columns")
     tags = dict(_TAG.findall("\n".join(decode_head(source.head).splitlines())))
@@ -87,12 +80,11 @@ def _read(source: Source, options: ReadOptions) -> Samples | DirectionalSamples:
     whole = np.isfinite(numbers).all(axis=1, keepdims=True)
     x, values = np.where(whole, x, 0.0), np.where(whole, values, np.nan)
     with np.errstate(all="ignore"):
-        light, view = _TWO_DIRECTIONS[parametrization][1](x)
+        light, view = _TWO_DIRECTIONS[parametrization][1](*x.T)
         if kind == _WEIGHTED:
             values = values / np.where(view[:, 2:] > 0, view[:, 2:], np.nan)
             notes += ("the values hold the cosine of the view, by which they are divided",)
-        angles = (polar_angle(light), azimuth(light), polar_angle(view), azimuth(view))
-    return directional_samples(path, *angles, values, names, notes)
+        return samples_of_vectors(path, light, view, values, names, notes)
 
 
 def _dimensions(path: Path, text: str) -> tuple[int, int]:
@@ -103,9 +95,8 @@ def _dimensions(path: Path, text: str) -> tuple[int, int]:
 
 
 def _check_parametrization(path: Path, parametrization: str, inputs: int) -> None:
-    known = dict.fromkeys(_ONE_ANGLE, 1) | {
-        name: size for name, (size, _) in _TWO_DIRECTIONS.items()
-    }
+    sizes = {name: size for name, (size, _) in _TWO_DIRECTIONS.items()}
+    known = dict.fromkeys(_ONE_ANGLE, 1) | sizes
     if parametrization not in known:
         raise MdfconvError(
             f"{path}: ALTA input parametrization '{parametrization}'", f"known: {', '.join(known)}"

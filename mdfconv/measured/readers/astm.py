@@ -13,7 +13,7 @@ from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, decode, decode_head
 from mdfconv.measured.readers.tables import parse_table
 from mdfconv.measured.readers.text import read_table
-from mdfconv.measured.samples import DirectionalSamples, Samples
+from mdfconv.measured.samples import Measurements
 
 _VARIABLES = re.compile(r"^\s*VARS[ \t]*:?[ \t]+(?P<names>\S.*?)\s*$", re.M | re.I)
 _COUNT = re.compile(r"^\s*NUM_POINTS[ \t]*:?[ \t]+(?P<count>\S+)", re.M | re.I)
@@ -23,7 +23,7 @@ def _recognizes(name: str, head: bytes) -> bool:
     return bool(_VARIABLES.search(decode_head(head)))
 
 
-def _read(source: Source, options: ReadOptions) -> Samples | DirectionalSamples:
+def _read(source: Source, options: ReadOptions) -> Measurements:
     lines = decode(source).splitlines()
     at = next(index for index, line in enumerate(lines) if _VARIABLES.match(line))
     head, names = "\n".join(lines[:at]), _VARIABLES.match(lines[at])
@@ -31,7 +31,7 @@ def _read(source: Source, options: ReadOptions) -> Samples | DirectionalSamples:
     blank = [""] * at
     table = parse_table(source.path, [*blank, names["names"] if names else "", *lines[at + 1 :]])
     _check_count(source.path, head, len(table.numbers))
-    return read_table(source.path, table, options)
+    return read_table(table, options)
 
 
 def _check_count(path: Path, head: str, rows: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import mmap
+import struct
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -10,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mdfconv.brdf.microfacet import direction, mirrored
+from mdfconv.brdf.microfacet import azimuth, direction, mirrored, polar_angle
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.samples import DirectionalSamples, Samples
+from mdfconv.measured.samples import DirectionalSamples, Measurements, directional_samples
 from mdfconv.output.files import STANDARD_INPUT
 
 # Laboratories write pages of comments before the words that a format is known by.
@@ -29,6 +30,8 @@ _CONTROLS = dict.fromkeys(
     {*range(32), *range(127, 160), 0x2028, 0x2029} - {ord("\t"), ord("\n"), ord("\r"), ord("\f")},
     "\ufffd",
 )
+# What Python raises about bytes that are not what a reader takes them for.
+_MALFORMED = (ArithmeticError, LookupError, StopIteration, ValueError, struct.error)
 
 
 @dataclass(frozen=True)
@@ -71,15 +74,7 @@ class ReadOptions:
 
 @dataclass(frozen=True)
 class Source:
-    """The bytes of a file or of standard input.
-
-    Parameters
-    ----------
-    path : Path
-        The file; for standard input what messages call it.
-    content : bytes or mmap.mmap
-        Its bytes. A slice of either is bytes.
-    """
+    """The bytes of a file or of standard input, and what messages call it."""
 
     path: Path
     content: bytes | mmap.mmap
@@ -101,22 +96,27 @@ class Reader:
     recognizes : callable
         Of the file's name and its first bytes: whether the file is of this format.
     read : callable
-        Of a `Source` and `ReadOptions`: the samples. Raises `MdfconvError`.
+        Of a `Source` and `ReadOptions`: the samples. Raises `MdfconvError` where it can say what
+        is wrong; what else Python raises about a malformed file becomes one in `samples`.
     """
 
     name: str
     recognizes: Callable[[str, bytes], bool]
-    read: Callable[[Source, ReadOptions], Samples | DirectionalSamples]
+    read: Callable[[Source, ReadOptions], Measurements]
+
+    def samples(self, source: Source, options: ReadOptions) -> Measurements:
+        """Return the samples of a file of this format; raise `MdfconvError` if it is malformed."""
+        try:
+            return self.read(source, options)
+        except MdfconvError:
+            raise
+        except _MALFORMED as error:
+            reason = " ".join(f"{type(error).__name__} {error}".split())
+            raise MdfconvError(f"cannot read {source.path} as {self.name}: {reason}") from error
 
 
 def open_source(path: Path | str) -> Source:
-    """Return the content of a file, or of standard input for ``"-"``.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be read.
-    """
+    """Return the content of a file, or of standard input for ``"-"``."""
     if str(path) == STANDARD_INPUT:
         return Source(Path("standard input"), sys.stdin.buffer.read() if sys.stdin else b"")
     path = Path(path)
@@ -130,10 +130,7 @@ def open_source(path: Path | str) -> Source:
 def decode(source: Source) -> str:
     """Return the text of a source: UTF-8, or what its byte order mark says; no control characters.
 
-    Raises
-    ------
-    MdfconvError
-        If it is not text.
+    Raises `MdfconvError` if it is not text.
     """
     content = source.content[:]
     encoding = _encoding(content)
@@ -156,6 +153,20 @@ def _encoding(content: bytes) -> str:
     return next(marks, "utf-8")
 
 
+def samples_of_vectors(
+    path: Path,
+    incident: Array,
+    outgoing: Array,
+    values: Array,
+    channels: tuple[str, ...],
+    notes: tuple[str, ...],
+) -> DirectionalSamples:
+    """Return samples of directions that are vectors, shape (n, 3), as `directional_samples`."""
+    light = polar_angle(incident), azimuth(incident)
+    view = polar_angle(outgoing), azimuth(outgoing)
+    return directional_samples(path, *light, *view, values, channels, notes)
+
+
 def turn_from_normal(vectors: Array, theta: Array, phi: Array) -> Array:
     """Return vectors, shape (n, 3), turned as the normal has to be to come to (θ, φ).
 
@@ -171,21 +182,10 @@ def from_half_and_difference(
 ) -> tuple[Array, Array]:
     """Return the two directions of the coordinates of Rusinkiewicz 1998, each of shape (n, 3).
 
-    Parameters
-    ----------
-    theta_half, phi_half : numpy.ndarray, shape (n,)
-        Zenith and azimuth of the half vector, radians.
-    theta_difference, phi_difference : numpy.ndarray, shape (n,)
-        Those of the first direction where the half vector is the normal.
-
-    Returns
-    -------
-    tuple of numpy.ndarray
-        The first direction, and the one on the other side of the half vector.
+    The angles of the difference are those of the first direction where the half vector is the
+    normal; the second direction is the one on the other side of the half vector.
     """
     first = direction(theta_difference, phi_difference)
-    second = mirrored(first)
-    return (
-        turn_from_normal(first, theta_half, phi_half),
-        turn_from_normal(second, theta_half, phi_half),
-    )
+    both = (first, mirrored(first))
+    first, second = (turn_from_normal(vectors, theta_half, phi_half) for vectors in both)
+    return first, second

@@ -1,4 +1,8 @@
-"""The MERL BRDF database's isotropic binary format (Matusik et al. 2003)."""
+"""The MERL BRDF database's isotropic binary format (Matusik et al. 2003).
+
+Three int32 dimensions (θ_h, θ_d, φ_d), then float64 planes R, G and B, whose negative values are
+invalid. Of n angles, θ_h of index i is (i/n)² π/2, θ_d is i/n · π/2 and φ_d is i/n · π.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mdfconv.brdf.microfacet import azimuth as azimuths
-from mdfconv.brdf.microfacet import polar_angle
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers.base import (
@@ -16,8 +18,9 @@ from mdfconv.measured.readers.base import (
     Source,
     from_half_and_difference,
     open_source,
+    samples_of_vectors,
 )
-from mdfconv.measured.samples import DirectionalSamples, Samples, directional_samples, samples
+from mdfconv.measured.samples import DirectionalSamples, Measurements, Samples, samples
 
 _HEADER_BYTES = 12
 # Of R, G and B, by which the database's own reader multiplies.
@@ -30,50 +33,21 @@ _HORIZON = 1e-5
 
 
 def read_merl(path: Path) -> Samples:
-    """Read the slice θ_d ≈ 0 of a MERL file, averaged over φ_d.
-
-    Parameters
-    ----------
-    path : Path
-        Three int32 dimensions (θ_h, θ_d, φ_d), then float64 planes R, G, B; negative values
-        are invalid. θ_h of index i is (i/n)² π/2.
-
-    Raises
-    ------
-    MdfconvError
-        If the dimensions make no sense or the file is shorter or longer than they say.
-    """
+    """Read the slice θ_d ≈ 0 of a MERL file, averaged over φ_d."""
     return _slice(open_source(path))
 
 
 def read_merl_directional(
     path: Path | str, count: int = 20000, seed: int = 0
 ) -> DirectionalSamples:
-    """Read a random sample of the cells of a MERL file, as many of every θ_h.
+    """Read about so many valid cells of a MERL file, by chance, as many of every θ_h.
 
     θ_h is dense where lobes are, so that equally many cells of each show the peak.
-
-    Parameters
-    ----------
-    path : Path or str
-        As for `read_merl`; ``"-"`` is standard input. Index j of θ_d is j/n · π/2, index k of
-        φ_d is k/n · π.
-    count : int
-        About how many cells; fewer where a θ_h has fewer that are valid.
-    seed : int
-        Of the choice; the same cells come back for the same one.
-
-    Returns
-    -------
-    DirectionalSamples
-        Only cells that are valid and have both directions above the horizon.
-
-    Raises
-    ------
-    MdfconvError
-        As `read_merl`, or if no cell is valid.
     """
-    source = open_source(path)
+    return _cells(open_source(path), count, seed)
+
+
+def _cells(source: Source, count: int, seed: int = 0) -> DirectionalSamples:
     planes = _planes(source)
     _, half, difference, azimuth = planes.shape
     generator = np.random.default_rng(seed)
@@ -97,16 +71,7 @@ def read_merl_directional(
     incident, outgoing = np.concatenate(directions, axis=1)
     taken = np.concatenate(values)
     note = f"{len(taken)} of {planes[0].size} cells are taken, by chance and as many of every θ_h"
-    return directional_samples(
-        source.path,
-        polar_angle(incident),
-        azimuths(incident),
-        polar_angle(outgoing),
-        azimuths(outgoing),
-        taken,
-        _CHANNELS,
-        (note,),
-    )
+    return samples_of_vectors(source.path, incident, outgoing, taken, _CHANNELS, (note,))
 
 
 def _slice(source: Source) -> Samples:
@@ -159,13 +124,13 @@ def _recognizes(name: str, head: bytes) -> bool:
     return name.lower().endswith(".binary") or _dimensions(head) is not None
 
 
-def _read(source: Source, options: ReadOptions) -> Samples | DirectionalSamples:
+def _read(source: Source, options: ReadOptions) -> Measurements:
     options.refuse(source.path, "a MERL file has no columns")
     if options.cells is None:
         return _slice(source)
     if options.cells < 1:
         raise MdfconvError(f"{options.cells} cells: at least 1")
-    return read_merl_directional(source.path, options.cells)
+    return _cells(source, options.cells)
 
 
 READER = Reader("MERL", _recognizes, _read)

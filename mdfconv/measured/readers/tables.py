@@ -1,12 +1,14 @@
-"""Text as a table of numbers: which marks separate columns, and which lines name them."""
+"""Text as a table of numbers: what the names of columns say, and which marks separate cells."""
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -26,94 +28,91 @@ class Role(StrEnum):
     angle = "angle"
 
 
-_LETTERS = {"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "Δ": " delta ", "δ": " delta "}
-_ZENITH = {"theta", "zenith", "polar", "colatitude", "th"}
-_AZIMUTH = {"phi", "azimuth", "azimuthal", "azi", "az", "ph"}
-_ANGLE = {"angle", "beta", "alpha"}
-_INCIDENT = {
-    "i", "in", "inc", "incident", "incidence", "incoming", "ingoing", "input", "light", "l",
-    "source", "src", "illumination", "aoi",
-}  # fmt: skip
-_OUTGOING = {
-    "o", "out", "outgoing", "output", "r", "refl", "reflected", "reflection", "s", "scat",
-    "scatter", "scattered", "scattering", "v", "view", "viewing", "viewer", "detector", "det",
-    "observer", "observation", "e", "exit", "emergent", "emission", "exitant",
-}  # fmt: skip
-_DIFFERENCE = {"delta", "relative", "rel", "diff", "difference"}
-_HALF = {"h", "half", "halfway"}
-_OF_HALF = _HALF | {"beta"}
-_UNITS = {"deg", "degree", "degrees", "rad", "radian", "radians", "cos", "cosine"}
-_FILLERS = {"of", "the", "direction", "dir", "vector", "normal", "w", "omega"}
+# The words of names, by what they speak of.
+_WORDS = {
+    "zenith": "theta zenith polar colatitude th",
+    "azimuth": "phi azimuth azimuthal azi az ph",
+    "angle": "angle beta alpha",
+    "incident": "i in inc incident incidence incoming ingoing input light l source src "
+    "illumination aoi",
+    "outgoing": "o out outgoing output r refl reflected reflection s scat scatter scattered "
+    "scattering v view viewing viewer detector det observer observation e exit emergent emission "
+    "exitant",
+    "difference": "delta relative rel diff difference",
+    "half": "h half halfway",
+    "unit": "deg degree degrees rad radian radians cos cosine",
+    "filler": "of the direction dir vector normal w omega",
+    # The others are names as a whole.
+    "value": "brdf bsdf f fr value values val r g b red green blue x y z luminance ndf d "
+    "reflectance",
+    "wavelength": "wavelength lambda λ wavelengthnm",
+    "index": "index idx no nr n id row sample point num number i",
+}
+_VOCABULARY = {kind: frozenset(words.split()) for kind, words in _WORDS.items()}
+_ANGULAR = ("zenith", "azimuth", "angle")
+_SPELLED = {"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "Δ": " delta ", "δ": " delta "}
 _JOINED = re.compile(r"(delta|d)?(theta|phi|zenith|azimuth)(\w*)")
-_VALUES = {
-    "brdf", "bsdf", "f", "fr", "value", "values", "val", "r", "g", "b", "red", "green", "blue",
-    "x", "y", "z", "luminance", "ndf", "d", "reflectance",
-}  # fmt: skip
-_WAVELENGTH = re.compile(r"(lambda|wl|brdf|bsdf|r)?\s*_?\d{3,4}(\.\d+)?\s*(nm)?", re.I)
-_INDEX = {"", "index", "idx", "no", "nr", "n", "id", "row", "sample", "point", "num", "number", "i"}
+_CHANNEL = re.compile(r"(lambda|wl|brdf|bsdf|r)?\s*_?\d{3,4}(\.\d+)?\s*(nm)?", re.I)
 
 
+@cache
 def role_of(name: str) -> Role | None:
     """Return what kind of angle a name speaks of; None if of none, or of another coordinate."""
     words = _words(name)
-    kinds = set(words)
-    sides = kinds - _ZENITH - _AZIMUTH - _ANGLE - _UNITS
-    incident, outgoing = bool(sides & _INCIDENT), bool(sides & _OUTGOING)
-    if kinds & _AZIMUTH:
-        if sides & _DIFFERENCE or not sides - _FILLERS:
+    sides = words - _vocabulary(*_ANGULAR, "unit")
+    is_whole = not sides - _vocabulary("filler")
+    incident, outgoing = (bool(sides & _VOCABULARY[side]) for side in ("incident", "outgoing"))
+    if words & _VOCABULARY["azimuth"]:
+        if is_whole or sides & _VOCABULARY["difference"]:
             return Role.phi
-        if incident != outgoing:
-            return Role.phi_i if incident else Role.phi_o
-        return None
-    if kinds & (_ZENITH | _ANGLE) or "aoi" in kinds:
-        if sides & _HALF or not sides - _FILLERS:
+        one_side = (Role.phi_i, Role.phi_o)
+    elif words & _vocabulary("zenith", "angle") or "aoi" in words:
+        if is_whole or sides & _VOCABULARY["half"]:
             return Role.angle
-        return _side(incident, outgoing)
-    return Role.angle if kinds & _UNITS and not kinds - _UNITS else None
-
-
-def _side(incident: bool, outgoing: bool) -> Role | None:
-    if incident == outgoing:
-        return None
-    return Role.theta_i if incident else Role.theta_o
+        one_side = (Role.theta_i, Role.theta_o)
+    else:
+        return Role.angle if words and words <= _VOCABULARY["unit"] else None
+    return one_side[outgoing] if incident != outgoing else None
 
 
 def is_half(name: str) -> bool:
     """Return whether a name is one of the angle of half vectors."""
-    return bool(set(_words(name)) & _OF_HALF)
+    return bool(_words(name) & {*_VOCABULARY["half"], "beta"})
 
 
 def is_angle(name: str) -> bool:
     """Return whether a name is one of an angle, be it of coordinates that are not read."""
-    return bool(set(_words(name)) & (_ZENITH | _AZIMUTH | _ANGLE)) or role_of(name) is not None
+    return bool(_words(name) & _vocabulary(*_ANGULAR)) or role_of(name) is not None
 
 
 def is_value(name: str) -> bool:
     """Return whether a name is one of values: of a BRDF, a channel or a wavelength."""
     bare = _bare(name)
-    joined = re.sub(r"[^a-z0-9]", "", bare)
-    return joined in _VALUES or bool(_WAVELENGTH.fullmatch(bare.strip()))
+    is_known = re.sub(r"[^a-z0-9]", "", bare) in _VOCABULARY["value"]
+    return is_known or bool(_CHANNEL.fullmatch(bare.strip()))
 
 
 def is_wavelength(name: str) -> bool:
     """Return whether a name is that of a column of wavelengths."""
-    return re.sub(r"[^a-zλ]", "", _bare(name)) in {"wavelength", "lambda", "λ", "wavelengthnm"}
+    return re.sub(r"[^a-zλ]", "", _bare(name)) in _VOCABULARY["wavelength"]
 
 
 def counts_rows(name: str, numbers: Array) -> bool:
     """Return whether a column is called an index and counts, from 0 or 1."""
-    called = re.sub(r"[^a-z]|unnamed", "", name.lower()) in _INDEX and role_of(name) is None
-    return called and is_counting(numbers)
+    bare = re.sub(r"[^a-z]|unnamed", "", name.lower())
+    is_index = bare in {"", *_VOCABULARY["index"]} and role_of(name) is None
+    return is_index and is_counting(numbers)
 
 
 def is_counting(numbers: Array) -> bool:
     """Return whether numbers count, from 0 or 1."""
     first = numbers[0]
-    return (
-        numbers.size > 2
-        and first in (0, 1)
-        and bool(np.array_equal(numbers, first + np.arange(numbers.size)))
-    )
+    counted = first + np.arange(numbers.size)
+    return numbers.size > 2 and first in (0, 1) and bool(np.array_equal(numbers, counted))
+
+
+def _vocabulary(*kinds: str) -> frozenset[str]:
+    return frozenset().union(*(_VOCABULARY[kind] for kind in kinds))
 
 
 def _bare(name: str) -> str:
@@ -121,24 +120,24 @@ def _bare(name: str) -> str:
     return re.sub(r"[\[({].*?[\])}]", " ", name).lower()
 
 
-def _words(name: str) -> list[str]:
+def _words(name: str) -> frozenset[str]:
     """Return the words of a name: thetaIn, theta_in and θ in are theta and in."""
     text = name.replace("°", " deg ")
-    for letter, word in _LETTERS.items():
+    for letter, word in _SPELLED.items():
         text = text.replace(letter, word)
-    text = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)
-    words = []
-    for word in re.findall(r"[a-z]+", text.lower()):
+    words: set[str] = set()
+    for word in re.findall(r"[a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text).lower()):
         joined = _JOINED.fullmatch(word)
         if joined:
             difference, kind, side = joined.groups()
-            words += ["delta"] * bool(difference) + [kind] + [side] * bool(side)
+            words |= {"delta" if difference else kind, kind, side or kind}
         else:
-            words.append(word)
-    return words
+            words.add(word)
+    return frozenset(words)
 
 
 _COMMENT = re.compile(r"^\s*(#+|%+|//+|!+)\s?")
+_COMMENT_HINT = "comments start with #, %, // or !"
 # Lines by which the form of a table is decided.
 _LOOKED_AT = 50
 # What a cell of a second line of headers holds.
@@ -156,28 +155,29 @@ class TableForm:
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line, without blanks and quotes around them."""
-        if self.separator is None:
-            parts = line.split()
-        elif '"' in line:
-            try:
+        parts = line.split(self.separator)
+        if self.separator and '"' in line:
+            with suppress(csv.Error):
                 parts = next(csv.reader([line], delimiter=self.separator, skipinitialspace=True))
-            except csv.Error:
-                parts = line.split(self.separator)
-        else:
-            parts = line.split(self.separator)
         return [part.strip().strip("\"'").strip() for part in parts]
 
     def numbers(self, line: str) -> list[float] | None:
         """Return the numbers of a line, NaN for an empty cell; None if a cell holds none."""
+        cells = self.cells(line)
+        if self.decimal_comma:
+            cells = [cell.replace(",", ".") for cell in cells]
         try:
-            return [self._number(cell) for cell in self.cells(line)]
+            return [float(cell) if cell else np.nan for cell in cells]
         except ValueError:
             return None
 
-    def _number(self, cell: str) -> float:
-        if not cell:
-            return np.nan
-        return float(cell.replace(",", ".") if self.decimal_comma else cell)
+    def names(self, line: str, width: int) -> list[str]:
+        """Return the cells of a line of words, which may be set apart otherwise than numbers."""
+        cells = self.cells(line)
+        if len(cells) == width:
+            return cells
+        others = (form.cells(line) for form in _FORMS)
+        return next((other for other in others if len(other) == width), cells)
 
 
 # Those with decimal points first: of forms that read a table alike, the first is taken.
@@ -197,22 +197,11 @@ _FORMS = (
 class Table:
     """The numbers of a text file.
 
-    Parameters
-    ----------
-    names : list of str
-        The names of the columns; their numbers from 1 if the file has none.
-    units : list of str
-        What a second line of headers says of each column, or empty strings.
-    numbers : numpy.ndarray, shape (rows, columns)
-        The cells, NaN where one is empty.
-    is_named : bool
-        Whether the file names its columns.
-    comments : list of str
-        The lines that are comments, without their marks.
-    notes : tuple of str
-        What was assumed.
+    Columns have names, their numbers from 1 if the file gives none, and units, which a second line
+    of headers gives. Empty cells are NaN, comments are without their marks.
     """
 
+    path: Path
     names: list[str]
     units: list[str]
     numbers: Array
@@ -220,38 +209,47 @@ class Table:
     comments: list[str] = field(default_factory=list)
     notes: tuple[str, ...] = ()
 
+    def column(self, name: str) -> int:
+        """Return the index of a column that the user names, or numbers from 1."""
+        lowered = [heading.lower() for heading in self.names]
+        if name.lower() in lowered:
+            return lowered.index(name.lower())
+        if name.isdecimal() and 1 <= int(name) <= len(self.names):
+            return int(name) - 1
+        raise self.error(f"no column '{name}'", f"there are {', '.join(self.names)}")
 
-def parse_table(path: Path, lines: Sequence[str]) -> Table:
-    """Return the table that lines of text hold.
+    def listed(self, columns: Sequence[int]) -> str:
+        """Return columns as a message names them."""
+        names = ", ".join(f"'{self.names[index]}'" for index in columns)
+        return f"column{'s' if len(columns) > 1 else ''} {names}"
 
-    Parameters
-    ----------
-    path : Path
-        The file, for messages.
-    lines : sequence of str
-        Its lines. Those that start with #, %, // or ! are comments.
+    def error(self, reason: str, hint: str = "", *, argument: str = "") -> MdfconvError:
+        """Return an error about the file."""
+        return MdfconvError(f"{self.path}: {reason}", hint, argument=argument)
 
-    Raises
-    ------
-    MdfconvError
-        If there are no numbers, or a line has others than numbers or too many or few of them.
+
+def parse_table(path: Path, lines: Iterable[str]) -> Table:
+    """Return the table that lines of text hold; those that start with #, %, // or ! are comments.
+
+    Raises `MdfconvError` if there are no numbers, or a line has others than numbers or too many or
+    few of them.
     """
     rows, comments = [], []
-    for number, line in enumerate(lines, start=1):
+    for place, line in enumerate(lines, start=1):
         mark = _COMMENT.match(line)
         if mark:
             comments.append(line[mark.end() :].strip())
         elif line.strip():
-            rows.append((number, line.strip()))
+            rows.append((place, line.strip()))
     form = _form_of([line for _, line in rows[: _LOOKED_AT + 2]])
     headers, numbers = _numbers(path, rows, form)
     width = numbers.shape[1]
-    names, units = _names(path, headers, width, form)
+    names, units = _headings(path, headers, width, form)
     notes = ("commas are read as decimal points",) if form.decimal_comma else ()
     is_named = bool(names)
     names = names or [str(index + 1) for index in range(width)]
-    table = Table(names, units or [""] * width, numbers, is_named, comments, notes)
-    table = _without_empty_columns(table)
+    table = Table(path, names, units or [""] * width, numbers, is_named, comments, notes)
+    table = _without_empty_column(table)
     return table if is_named else _named_in_comments(table, form)
 
 
@@ -259,10 +257,10 @@ def _form_of(lines: Sequence[str]) -> TableForm:
     """Return the form under which the most lines are numbers, more than one a line if any is."""
     rows = [[form.numbers(line) for line in lines] for form in _FORMS]
     wide = [sum(row is not None and len(row) > 1 for row in read) for read in rows]
-    if max(wide, default=0):
+    if max(wide):
         return _FORMS[wide.index(max(wide))]
     separators = (
-        form for form in _FORMS if form.separator and lines and form.separator in lines[0]
+        form for form in _FORMS if lines and form.separator and form.separator in lines[0]
     )
     return next(separators, TableForm(None))
 
@@ -272,83 +270,64 @@ def _numbers(
 ) -> tuple[list[tuple[int, str]], Array]:
     """Return the lines before the first row of numbers, and the numbers."""
     headers: list[tuple[int, str]] = []
-    numbers: list[list[float]] = []
-    places: list[int] = []
+    numbers: list[tuple[int, list[float]]] = []
     for place, line in rows:
         row = form.numbers(line)
         if row is not None:
-            numbers.append(row)
-            places.append(place)
+            numbers.append((place, row))
         elif numbers or len(headers) > 1:
-            raise MdfconvError(
-                f"{path}, line {place}: not numbers: {line[:60]}",
-                "comments start with #, %, // or !",
-            )
+            raise _no_numbers(path, place, line)
         else:
             headers.append((place, line))
     if not numbers:
         raise MdfconvError(f"{path}: no numeric rows")
-    header = _split_to_width(headers[0][1], form, None) if headers else numbers[0]
-    width = len(numbers[0]) if headers and len(header) != len(numbers[0]) else len(header)
-    for place, row in zip(places, numbers, strict=True):
+    width = len(numbers[0][1])
+    for place, row in numbers:
         if len(row) != width:
             raise MdfconvError(f"{path}, line {place}: {len(row)} columns where {width} go")
-    return headers, np.array(numbers)
+    return headers, np.array([row for _, row in numbers])
 
 
-def _names(
+def _headings(
     path: Path, headers: Sequence[tuple[int, str]], width: int, form: TableForm
 ) -> tuple[list[str], list[str]]:
     """Return the names and the units that the lines above the numbers give."""
-    if not headers:
-        return [], []
-    names = _split_to_width(headers[0][1], form, width)
-    if len(names) != width:
+    cells = [form.names(line, width) for _, line in headers]
+    names, units = (*cells, [], [])[:2]
+    if headers and len(names) != width:
         raise MdfconvError(
             f"{path}, line {headers[0][0]}: names {len(names)} columns where {width} are",
-            "comments start with #, %, // or !",
+            _COMMENT_HINT,
         )
-    if len(headers) == 1:
-        return names, []
-    place, line = headers[1]
-    units = _split_to_width(line, form, width)
-    if len(units) != width or not all(_UNIT.fullmatch(unit) for unit in units):
-        raise MdfconvError(
-            f"{path}, line {place}: not numbers: {line[:60]}", "comments start with #, %, // or !"
-        )
+    is_of_units = len(units) == width and all(_UNIT.fullmatch(unit) for unit in units)
+    if len(headers) > 1 and not is_of_units:
+        raise _no_numbers(path, *headers[1])
     return names, units
 
 
-def _split_to_width(line: str, form: TableForm, width: int | None) -> list[str]:
-    """Return the cells of a line of words, which may be separated otherwise than the numbers."""
-    cells = form.cells(line)
-    if width is None or len(cells) == width:
-        return cells
-    others = (other.cells(line) for other in _FORMS)
-    return next((other for other in others if len(other) == width), cells)
+def _no_numbers(path: Path, place: int, line: str) -> MdfconvError:
+    return MdfconvError(f"{path}, line {place}: not numbers: {line[:60]}", _COMMENT_HINT)
 
 
-def _without_empty_columns(table: Table) -> Table:
+def _without_empty_column(table: Table) -> Table:
     """Leave out a last column that only a separator at the end of every line makes."""
-    if table.numbers.shape[1] < 2 or not np.isnan(table.numbers[:, -1]).all():
+    numbers = table.numbers
+    if numbers.shape[1] < 2 or not np.isnan(numbers[:, -1]).all():
         return table
     if table.is_named and table.names[-1]:
         return table
-    return replace(
-        table, names=table.names[:-1], units=table.units[:-1], numbers=table.numbers[:, :-1]
-    )
+    return replace(table, names=table.names[:-1], units=table.units[:-1], numbers=numbers[:, :-1])
 
 
 def _named_in_comments(table: Table, form: TableForm) -> Table:
     """Take the names from the last comment that can be one: as many, and some known ones."""
     width = table.numbers.shape[1]
     for comment in reversed(table.comments):
-        names = _split_to_width(comment, form, width)
+        names = form.names(comment, width)
         if len(names) != width:
             continue
-        roles = [role_of(name) for name in names]
-        angles = sum(role is not None for role in roles)
-        if angles and (angles > 1 or any(is_value(name) for name in names)):
+        angles = sum(role_of(name) is not None for name in names)
+        if angles > 1 or (angles and any(map(is_value, names))):
             note = f"the names of the columns are taken from the comment '{comment[:60]}'"
             return replace(table, names=names, is_named=True, notes=(*table.notes, note))
     return table

@@ -8,8 +8,7 @@ and the azimuth about it, 0 towards the normal of the surface and counter-clockw
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,21 +27,24 @@ from mdfconv.measured.readers.base import (
 )
 from mdfconv.measured.samples import DirectionalSamples, directional_samples
 
+_KNOWN_BY = re.compile(r"^\s*AngleOfIncidence\s", re.M | re.I)
+_WORDS = ("source", "symmetry", "spectralcontent", "scattertype")
+# The axes of the values, of which the first may be missing.
+_ANGLES = ("samplerotation", "angleofincidence", "scatterazimuth", "scatterradial")
+_CHANNELS = {"monochrome": "value", "tristimulusx": "X", "tristimulusy": "Y", "tristimulusz": "Z"}
 
-class Words:
-    """A place in a text that moves on from word to word.
 
-    Parameters
-    ----------
-    path : Path
-        The file, for messages.
-    lines : iterable of (int, str)
-        Its lines and their numbers from 1, without comments.
-    """
+class _Words:
+    """A place in a text that moves on from word to word."""
 
-    def __init__(self, path: Path, lines: Iterable[tuple[int, str]]) -> None:
+    def __init__(self, path: Path, text: str) -> None:
         self._path = path
-        self._words = [(number, word) for number, line in lines for word in line.split()]
+        self._words = [
+            (number, word)
+            for number, line in enumerate(text.splitlines(), start=1)
+            if not line.lstrip().startswith("#")
+            for word in line.split()
+        ]
         self._at = 0
 
     def peek(self) -> str | None:
@@ -59,12 +61,12 @@ class Words:
 
     def expect(self, word: str) -> None:
         """Pass over a word; raise `MdfconvError` if another one stands there."""
-        found = self.next(word)
-        if found.lower() != word.lower():
-            raise self.error(f"'{found[:30]}' where {word} goes")
+        actual = self.next(word)
+        if actual.lower() != word.lower():
+            raise self.error(f"'{actual[:30]}' where {word} goes")
 
     def count(self, what: str) -> int:
-        """Return the next word as a count, at most that of the words that follow."""
+        """Return the next word as a count."""
         word = self.next(what)
         if not (word.isascii() and word.isdecimal() and len(word) < 10 and int(word) > 0):
             raise self.error(f"{what}: '{word[:30]}' is no count")
@@ -72,12 +74,11 @@ class Words:
 
     def numbers(self, count: int, what: str) -> Array:
         """Return the next numbers, shape (count,)."""
-        words = self._words[self._at : self._at + count]
-        if len(words) < count:
+        if len(self._words) - self._at < count:
             raise MdfconvError(f"{self._path}: truncated: it ends within {what}")
         numbers = np.empty(count)
-        for place, (_, word) in enumerate(words):
-            self._at += 1
+        for place in range(count):
+            word = self.next(what)
             try:
                 numbers[place] = float(word)
             except ValueError:
@@ -90,27 +91,6 @@ class Words:
         return MdfconvError(f"{self._path}, line {number}: {reason}")
 
 
-_KNOWN_BY = re.compile(r"^\s*AngleOfIncidence\s", re.M | re.I)
-_WORDS = ("source", "symmetry", "spectralcontent", "scattertype")
-_ANGLES = ("samplerotation", "angleofincidence", "scatterazimuth", "scatterradial")
-_CHANNELS = {"monochrome": "value", "tristimulusx": "X", "tristimulusy": "Y", "tristimulusz": "Z"}
-
-
-@dataclass(frozen=True)
-class _Grid:
-    """The angles of a file, radians."""
-
-    rotation: Array
-    incidence: Array
-    azimuth: Array
-    radial: Array
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Of the values of one channel."""
-        return self.rotation.size, self.incidence.size, self.azimuth.size, self.radial.size
-
-
 def _recognizes(name: str, head: bytes) -> bool:
     return bool(_KNOWN_BY.search(decode_head(head)))
 
@@ -118,24 +98,19 @@ def _recognizes(name: str, head: bytes) -> bool:
 def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
     path = source.path
     options.refuse(path, "the header of Zemax's format says what its numbers are")
-    lines = enumerate(decode(source).splitlines(), start=1)
-    words = Words(path, [(number, line) for number, line in lines if not _is_comment(line)])
-    grid = _header(path, words)
+    words = _Words(path, decode(source))
+    axes = _header(path, words)
     channels, tables = [], []
     while (word := words.peek()) is not None and word.lower() in _CHANNELS:
         channels.append(_CHANNELS[words.next("data").lower()])
-        tables.append(_channel(words, grid))
+        tables.append(_channel(words, [axis.size for axis in axes]))
     if not tables or words.peek() is not None:
         raise words.error(f"no data, or something else than data: {str(words.peek())[:30]}")
-    return _samples(path, grid, np.stack(tables, axis=-1), channels)
+    return _samples(path, axes, np.stack(tables, axis=-1), channels)
 
 
-def _is_comment(line: str) -> bool:
-    return line.lstrip().startswith("#")
-
-
-def _header(path: Path, words: Words) -> _Grid:
-    """Return the angles, and move on to the data."""
+def _header(path: Path, words: _Words) -> list[Array]:
+    """Return the angles of each axis, radians, and move on to the data."""
     angles: dict[str, Array] = {}
     while (key := (words.peek() or "").lower()) not in _CHANNELS:
         words.next("the data")
@@ -152,47 +127,40 @@ def _header(path: Path, words: Words) -> _Grid:
         raise MdfconvError(f"{path}: the header lacks {', '.join(missing)}")
     if not all(np.isfinite(values).all() for values in angles.values()):
         raise MdfconvError(f"{path}: an angle of the header is not finite")
-    return _Grid(angles.get(_ANGLES[0], np.zeros(1)), *(angles[key] for key in _ANGLES[1:]))
+    return [angles.get(key, np.zeros(1)) for key in _ANGLES]
 
 
-def _channel(words: Words, grid: _Grid) -> Array:
-    """Return the values of one channel, shape `_Grid.shape`."""
+def _channel(words: _Words, shape: Sequence[int]) -> Array:
+    """Return the values of one channel."""
     words.expect("DataBegin")
     blocks = []
-    for _ in range(grid.rotation.size * grid.incidence.size):
+    for _ in range(shape[0] * shape[1]):
         words.expect("TIS")
         words.numbers(1, "TIS")
-        blocks.append(words.numbers(grid.azimuth.size * grid.radial.size, "the values"))
+        blocks.append(words.numbers(shape[2] * shape[3], "the values"))
     words.expect("DataEnd")
-    return np.concatenate(blocks).reshape(grid.shape)
+    return np.concatenate(blocks).reshape(shape)
 
 
-def _samples(path: Path, grid: _Grid, values: Array, channels: Sequence[str]) -> DirectionalSamples:
+def _samples(
+    path: Path, axes: list[Array], values: Array, channels: Sequence[str]
+) -> DirectionalSamples:
     # At the specular direction all azimuths are one sample.
-    wanted = np.ones(grid.shape, bool)
-    wanted[:, :, 1:, np.abs(grid.radial) < 1e-9] = False
+    is_sample = np.ones(values.shape[:-1], bool)
+    is_sample[:, :, 1:, np.abs(axes[-1]) < 1e-9] = False
     measured = (values != 0).any(axis=-1)
-    empty = int(np.count_nonzero(wanted & ~measured))
+    empty = int(np.count_nonzero(is_sample & ~measured))
     notes = (f"{empty} values of 0 are places without a measurement and left out",) if empty else ()
     rotation, incidence, azimuth, radial = (
-        angle[wanted & measured]
-        for angle in np.meshgrid(
-            grid.rotation, grid.incidence, grid.azimuth, grid.radial, indexing="ij"
-        )
+        angle[is_sample & measured] for angle in np.meshgrid(*axes, indexing="ij")
     )
     # About the specular direction at azimuth 0, where x points away from the normal.
     about = direction(radial, np.pi + azimuth)
     outgoing = turn_from_normal(about, incidence, rotation)
-    theta, phi = polar_angle(outgoing), azimuths(outgoing)
+    view = polar_angle(outgoing), azimuths(outgoing)
+    values = values[is_sample & measured]
     return directional_samples(
-        path,
-        incidence,
-        np.pi + rotation,
-        theta,
-        phi,
-        values[wanted & measured],
-        tuple(channels),
-        notes,
+        path, incidence, np.pi + rotation, *view, values, tuple(channels), notes
     )
 
 

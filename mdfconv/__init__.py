@@ -1,10 +1,10 @@
 """Convert roughness between microfacet distributions.
 
 `convert` and `explain` take numbers, arrays and pairs; `convert_mtl`, `convert_gltf`,
-`convert_mitsuba` and `convert_texture` whole files and textures. Distributions, methods and
-metrics are given by their names: `list_distributions`, `list_methods` and `list_metrics` have
-them. What is not named here is in the packages, such as ``mdfconv.brdf``, which need no import
-of their own.
+`convert_mitsuba` and `convert_texture` whole files and textures; `read` and `fit` measurements.
+Distributions, methods and metrics are given by their names: `list_distributions`, `list_methods`
+and `list_metrics` have them. What is not named here is in the packages, such as ``mdfconv.brdf``,
+which need no import of their own.
 
 Examples
 --------
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from mdfconv.distributions import Distribution, distribution, list_distributions, register
     from mdfconv.errors import MdfconvError, MdfconvWarning
     from mdfconv.fitting.metrics import list_metrics, metric_named, register_metric
+    from mdfconv.measured import fit, read
     from mdfconv.scene import (
         TextureRule,
         convert_gltf,
@@ -47,10 +48,12 @@ __all__ = [
     "convert_texture_file",
     "distribution",
     "explain",
+    "fit",
     "list_distributions",
     "list_methods",
     "list_metrics",
     "metric_named",
+    "read",
     "register",
     "register_metric",
 ]
@@ -62,6 +65,7 @@ _ROOMS = {
     "distributions": ("Distribution", "distribution", "list_distributions", "register"),
     "errors": ("MdfconvError", "MdfconvWarning"),
     "fitting.metrics": ("list_metrics", "metric_named", "register_metric"),
+    "measured": ("fit", "read"),
     "scene": (
         "TextureRule",
         "convert_gltf",

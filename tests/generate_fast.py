@@ -14,7 +14,7 @@ import numpy as np
 
 import mdfconv
 from mdfconv.distributions import one_parameter_distributions
-from mdfconv.distributions.equivalence import exact_route, to_root
+from mdfconv.distributions.endpoint import exact_route, to_root
 from mdfconv.fitting import maps
 from mdfconv.fitting.maps import MapMaker, Piece
 from mdfconv.fitting.metrics import list_metrics, metric_named

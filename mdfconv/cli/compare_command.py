@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.names import asked_endpoint
 from mdfconv.cli.options import (
     DpiOption,
     FolderOption,
@@ -21,6 +20,7 @@ from mdfconv.cli.options import (
     FormatOption,
     FromOption,
     MethodOption,
+    asked_endpoint,
     chosen_metric,
     refuse_idle_metric,
 )

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.names import in_asked_forms, noted
 from mdfconv.cli.options import (
     ForceOption,
     Format,
@@ -22,6 +21,8 @@ from mdfconv.cli.options import (
     OutputOption,
     PngOption,
     chosen_gamma,
+    in_asked_forms,
+    noted,
 )
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.process import tell

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.names import asked_endpoint, in_asked_forms
 from mdfconv.cli.options import (
     DpiOption,
     ExposureOption,
@@ -17,7 +16,9 @@ from mdfconv.cli.options import (
     FormatOption,
     MethodOption,
     OptionalMetricOption,
+    asked_endpoint,
     asked_metric,
+    in_asked_forms,
     refuse_given,
 )
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
@@ -82,7 +83,7 @@ def command(
 
     mdfconv plot-error --m-b 0.2 --reference ggx --mdf beckmann --no-csv --output /tmp
     """
-    from mdfconv.conversion.arrays import given_metric
+    from mdfconv.conversion.values import metric_or_default
     from mdfconv.studies.error_curves import curves, draw_errors
 
     if not png and not svg:
@@ -98,7 +99,7 @@ def command(
     outputs = Outputs(*(folder / f"{name}{end}" for name in sets for end in endings), force=force)
     contents, rows = {}, []
     for name, parameters in sets.items():
-        drawn = curves(parameters, given_metric(chosen), points)
+        drawn = curves(parameters, metric_or_default(chosen), points)
         title = f"{reference} and its substitutes ({name})"
         for form in forms:
             picture = draw_errors(drawn, title, form=form, dpi=dpi, log=log)

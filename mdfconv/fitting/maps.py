@@ -20,7 +20,7 @@ import numpy as np
 
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.base import MapVariables
-from mdfconv.distributions.equivalence import follow, from_root, to_root
+from mdfconv.distributions.endpoint import follow, from_root, to_root
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.problem import FitTask

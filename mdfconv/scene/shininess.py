@@ -13,8 +13,8 @@ import numpy as np
 
 from mdfconv.conversion import convert
 from mdfconv.distributions import list_distributions
-from mdfconv.distributions.dialects import DIALECTS, Dialect, Specular, dialects_of
-from mdfconv.distributions.endpoint import endpoint, endpoints
+from mdfconv.distributions.dialects import DIALECTS, Specular
+from mdfconv.distributions.endpoint import endpoints, stored_forms
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.solve import errors_of_many
@@ -136,38 +136,28 @@ def encoding_records(metric: Metric) -> list[dict[str, Any]]:
     exponent ``roughness_100`` and ``rmse_100``, and so on for each of `EXPONENTS`: of GGX in
     Blinn/Phong's place, with a specular weight of 1; infinite for a mirror.
     """
-    texts = ("encoding", "formula", "range", "clamped", "programs", "source", "note")
     columns = [f"{what}_{n}" for n in EXPONENTS for what in ImporterResult._fields]
-    blank: dict[str, Any] = dict.fromkeys(texts, "")
-    blank |= {"specular": Specular.no.value} | dict.fromkeys(columns)
     by_exponent = importer_results(np.array(EXPONENTS, float), metric)
     records = []
     for owner in list_distributions():
-        for own in owner.encodings:
-            known = {"encoding": f"{owner.name}:{own.name}", "formula": own.formula}
-            records.append(blank | known | {"range": own.stored.legal})
-        for dialect in dialects_of(owner.name).values():
+        for end, dialect in stored_forms(owner):
+            assert end.encoding is not None, "it is a stored form"
+            name = dialect.name if dialect else end.encoding.name
+            record = {
+                "encoding": f"{owner.name}:{name}",
+                "formula": end.encoding.formula,
+                "range": end.stored.legal,
+                "clamped": "; ".join(end.clamped(np.empty(0))),
+                "programs": dialect.program if dialect else "",
+                "source": dialect.source if dialect else "",
+                "note": dialect.note if dialect else "",
+                "specular": (dialect.specular if dialect else Specular.no).value,
+            }
             costs = {
                 f"{what}_{n}": value
                 for n, results in zip(EXPONENTS, by_exponent, strict=True)
-                if dialect.name in results
-                for what, value in results[dialect.name]._asdict().items()
+                if name in results
+                for what, value in results[name]._asdict().items()
             }
-            records.append(blank | _texts(owner.name, dialect) | costs)
+            records.append(record | dict.fromkeys(columns) | costs)
     return records
-
-
-def _texts(owner: str, dialect: Dialect) -> dict[str, str]:
-    """Return what is to be read of a dialect."""
-    name = f"{owner}:{dialect.name}"
-    end = endpoint(f"{name}:1" if dialect.specular is Specular.needed else name)
-    return {
-        "encoding": name,
-        "formula": dialect.formula,
-        "range": end.stored.legal,
-        "clamped": "; ".join(end.clamped(np.empty(0))),
-        "programs": dialect.program,
-        "source": dialect.source,
-        "note": dialect.note,
-        "specular": dialect.specular.value,
-    }

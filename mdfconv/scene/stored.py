@@ -9,11 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdfconv.conversion.arrays import check_covered, unreachable
 from mdfconv.conversion.explanation import remaining_error
-from mdfconv.conversion.methods import Method, default_method
+from mdfconv.conversion.methods import check_covered
+from mdfconv.conversion.values import ConversionRule
 from mdfconv.distributions.endpoint import Endpoint
-from mdfconv.distributions.equivalence import exact_route, follow
 from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError
@@ -78,17 +77,17 @@ class StoredConverter:
         source: Endpoint,
         target: Endpoint,
         metric: Metric,
-        method: Method | None = None,
+        method: str | None = None,
         *,
         uniform_below: float = UNIFORM_BELOW,
         largest: float = np.inf,
     ) -> None:
         self.source, self.target, self.metric = source, target, metric
         self._pair = source.distribution, target.distribution
-        self.method = method or default_method(*self._pair)
+        self.rule = ConversionRule(source, target, method, metric)
+        self.method = self.rule.method
         self._uniform_below, self._largest = uniform_below, largest
-        self._exact = exact_route(*self._pair)
-        if self._exact is None:
+        if self.rule.exact is None:
             check_covered(self.method, metric, source, target)
         # Which of 0 and 1 stands for the smoothest surface.
         self.smoothest = float(source.stored.larger_is_smoother)
@@ -97,7 +96,7 @@ class StoredConverter:
     @property
     def keeps(self) -> str:
         """What the conversion keeps, in words; "" if the two are the same lobes."""
-        return self.method.keeps(self.metric) if self._exact is None else ""
+        return self.method.keeps(self.metric) if self.rule.exact is None else ""
 
     def __call__(self, stored: Array) -> StoredResults:
         """Convert stored numbers (float64, any shape)."""
@@ -157,11 +156,10 @@ class StoredConverter:
         except MdfconvError as error:
             return str(error)
         if self.target.stored.accepts(np.asarray(number.result)):
-            label, result = self.target.label, number_text(number.result)
-            return f"{label} would be {result}, above {number_text(self._largest)}"
-        results = self._parameters(parameter)
-        pair = self.source, self.target
-        return unreachable(self.method, self.metric, parameter, results, 0, *pair).reason
+            result, limit = number_text(number.result), number_text(self._largest)
+            return f"{self.target.label} would be {result}, above {limit}"
+        solved = self.rule.solve(parameter).parameter
+        return self.rule.refusal(float(parameter[0]), float(solved[0])).reason
 
     def _outcome_of_illegal(self, stored: Array) -> NDArray[np.uint8]:
         """Return what becomes of numbers that are no legal parameter."""
@@ -182,20 +180,13 @@ class StoredConverter:
 
     def _encoded(self, parameter: Array) -> Array:
         """Return what the target would store for parameters, NaN where they have no answer."""
-        results = self._parameters(parameter)
+        results = self.rule.solve(parameter).parameter
         results = np.where(self._pair[1].parameter.accepts(results), results, np.nan)
         if not self.target.encoding:
             return results
         with np.errstate(all="ignore"):
             # Not `Endpoint.encode`: what cannot be stored may be clamped.
             return self.target.encoding.encode(results)
-
-    def _parameters(self, parameter: Array) -> Array:
-        """Return what the method makes of legal parameters."""
-        with np.errstate(all="ignore"):
-            if self._exact is not None:
-                return np.asarray(follow(self._exact, parameter))
-            return np.asarray(self.method.convert(parameter, *self._pair, self.metric))
 
     def _storable(self, result: Array) -> Mask:
         with np.errstate(invalid="ignore"):

@@ -83,10 +83,8 @@ def test_results_above_the_largest_have_no_error():
 
 
 def test_a_method_that_does_not_cover_a_pair_is_refused():
-    from mdfconv.conversion.methods import method_named
-
     with pytest.raises(mdfconv.MdfconvError, match="ward has no conversion"):
-        converter("gauss", "ggx", method=method_named("ward"))
+        converter("gauss", "ggx", method="ward")
 
 
 def test_the_face_has_what_it_lists():

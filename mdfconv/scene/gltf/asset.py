@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isclose
@@ -10,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.conversion.arrays import warn_of
+from mdfconv.conversion.values import Converted
 from mdfconv.distributions.dialects import DIALECTS, Dialect
 from mdfconv.distributions.endpoint import Endpoint, endpoints
 from mdfconv.distributions.parameter import number_text
-from mdfconv.errors import MdfconvError
+from mdfconv.errors import MdfconvError, MdfconvWarning
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.gltf.document import FACTOR, PBR, GltfDocument
 from mdfconv.scene.gltf.images import GltfTextures
@@ -213,8 +214,12 @@ def _numbers(
         elif number.outcome is not Outcome.CONVERTED:
             reasons[factor] = convert.refusal(number)
     converted = [each for each in numbers.values() if each.outcome is Outcome.CONVERTED]
-    pair = [each.stored for each in converted], [each.result for each in converted]
-    warn_of(convert.method, [pair], convert.source, convert.target, stacklevel=3)
+    parameter = np.array([each.parameter for each in converted])
+    stored = np.array([each.result for each in converted])
+    results = Converted(parameter, stored, convert.target.decode_legal(stored))
+    sentences = convert.rule.true_cautions(results)
+    if sentences:
+        warnings.warn("; ".join(sentences), MdfconvWarning, stacklevel=3)
     return numbers, reasons, notes
 
 

@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mdfconv.conversion.methods import method_named
 from mdfconv.distributions import distribution
 from mdfconv.distributions.dialects import dialects_of
 from mdfconv.distributions.endpoint import Endpoint, endpoint, endpoints
@@ -163,11 +162,14 @@ class ValueConverter:
     """
 
     def __init__(self, rule: TextureRule) -> None:
-        method = None if rule.method is None else method_named(rule.method)
         source, target = rule.endpoints()
         # Texels are exact down to the smallest exponent.
         self._convert = StoredConverter(
-            source, target, metric_named(rule.metric), method, uniform_below=np.finfo(float).tiny
+            source,
+            target,
+            metric_named(rule.metric),
+            rule.method,
+            uniform_below=np.finfo(float).tiny,
         )
         self._factor = rule.factor
         scale = f"{' of' if source.encoding else ':'} {rule.factor:g} v" if rule.factor != 1 else ""

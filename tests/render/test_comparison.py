@@ -293,6 +293,9 @@ def test_no_text_is_cut_off_or_lies_on_another(targets, name, monkeypatch):
     renderer = figure.canvas.get_renderer()
     texts = [*figure.texts, *figure.legends[0].get_texts()]
     texts += [t for axes in figure.axes for t in (axes.title, axes.xaxis.label, axes.yaxis.label)]
+    texts += [t for axes in figure.axes for t in axes.texts]
+    plots = [axes for axes in figure.axes if axes.axison]
+    texts += [t for axes in plots for t in axes.get_xticklabels() if t.get_visible()]
     texts += [figure._suptitle]
     boxes = {t: t.get_window_extent(renderer) for t in set(texts) if t.get_text()}
     for text, box in boxes.items():

@@ -11,7 +11,6 @@ import os
 import random
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -24,51 +23,6 @@ Advance = Callable[[int], None]
 NOISE = 0.1
 # On Windows processor time advances in steps of 16 ms.
 clock = time.perf_counter if os.name == "nt" else time.thread_time
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """How much is measured.
-
-    Parameters
-    ----------
-    angles : int
-        Angles of an evaluation, uniform on [0, π/2].
-    conversions : int
-        Values of a conversion by a method that needs no more than `patience` for them.
-    fits : int
-        Values of a conversion by any other method, and of the comparison of results.
-    loop : int
-        Values of a loop of scipy.optimize.curve_fit, and of a fit by a scan.
-    rounds : int
-        Repeats that are counted.
-    largest : int
-        Values of the largest conversion in the table of times against counts.
-    patience : float
-        Seconds that one conversion may take; what would take longer is given fewer values.
-    """
-
-    angles: int
-    conversions: int
-    fits: int
-    loop: int
-    rounds: int
-    largest: int
-    patience: float
-
-
-FULL = Sizes(
-    angles=4_000_000,
-    conversions=1_000_000,
-    fits=256,
-    loop=17,
-    rounds=11,
-    largest=10**7,
-    patience=3.0,
-)
-QUICK = Sizes(
-    angles=2_000_000, conversions=100_000, fits=32, loop=5, rounds=5, largest=10**5, patience=0.2
-)
 
 
 class Spread(NamedTuple):
@@ -92,21 +46,10 @@ def spread(samples: Array) -> Spread:
 def interleave(
     functions: Mapping[str, Callable[[], object]], rounds: int, advance: Advance
 ) -> dict[str, Array]:
-    """Time functions in turns.
+    """Time functions in turns, and return the seconds of each by its name.
 
-    Parameters
-    ----------
-    functions : dict
-        From names to what is called without arguments.
-    rounds : int
-        Repeats that are counted, after one that is not.
-    advance : callable
-        Called with 1 after each round, the first one included.
-
-    Returns
-    -------
-    dict
-        From names to seconds, shape (rounds,); the same place in two of them is the same round.
+    `rounds` are counted after one that is not; the same place in two arrays is the same round.
+    `advance` is called with 1 after each round, the first one included.
     """
     times: dict[str, list[float]] = {name: [] for name in functions}
     order = list(functions)

@@ -17,13 +17,13 @@ RUNNER = """
 import io, json, sys
 import registered
 from matplotlib.figure import Figure
-from mdfconv.benchmark import timing
 from mdfconv.cli import main
+from mdfconv.studies import bench
 
 # What is drawn and how long it takes is not the question here.
 Figure.savefig = lambda figure, file, **options: file.write(b"a picture")
-timing.QUICK = timing.Sizes(
-    angles=512, conversions=64, fits=4, loop=2, rounds=2, largest=10, patience=0.05
+bench.QUICK = bench.Sizes(
+    angles=512, conversions=64, fits=4, loop=2, rounds=2, patience=0.05
 )
 
 answers = []

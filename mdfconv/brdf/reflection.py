@@ -91,27 +91,6 @@ def check_exponent(exponent: float) -> None:
         raise MdfconvError(f"Phong's exponent is at least 0, not {exponent:g}")
 
 
-def normalization(normalizer: str, cosine: Array, exponent: float) -> Array:
-    """Return I_M = ∫ cos^γ θ_r cos θ_i dω_i, exactly or as an approximation.
-
-    Parameters
-    ----------
-    normalizer : str
-        ``"usual"``, ``"arvo"`` or ``"mallett-yuksel"``.
-    cosine : numpy.ndarray
-        Cosine of the viewer with the normal, [0, 1].
-    exponent : float
-        γ ≥ 0; an integer up to 10⁵ for ``"arvo"``.
-
-    Raises
-    ------
-    MdfconvError
-        If the name is not known, or the exponent not one that the normalizer takes.
-    """
-    check_exponent(exponent)
-    return NORMALIZERS[normalizer](np.asarray(cosine, float), float(exponent))
-
-
 def usual(cosine: Array, exponent: float) -> Array:
     """Return 2π/(γ+2), which is I_M for a viewer along the normal and too large elsewhere."""
     return np.full_like(cosine, 2 * np.pi / (exponent + 2))

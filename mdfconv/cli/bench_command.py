@@ -11,14 +11,14 @@ from mdfconv.cli import completion
 from mdfconv.cli.names import asked_endpoint
 from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.tables import console, form_of, progress, table_text, write_table
+from mdfconv.cli.tables import form_of, progress, table_text, write_table
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
     from mdfconv.distributions.endpoint import Endpoint
     from mdfconv.distributions.evaluation import Array
-    from mdfconv.studies.bench.measure import Measurements, Task
+    from mdfconv.studies.bench import Measurements, Task
 
 # The paper's reference, and its common rough and smooth surface.
 _REFERENCE, _PARAMETERS = "beckmann", (0.2, 0.05)
@@ -75,11 +75,10 @@ def command(
 ) -> None:
     """Measure speed against error on this machine.
 
-    Distributions in the place of another one, conversion methods, their times for one value to
-    millions and how far those are from the evaluations that they cannot avoid, and kernels against
-    their textbook expressions: medians of interleaved repeats with quartiles, and what they say in
-    sentences. If Dr.Jit is installed, a kernel that it compiles is timed as well. CSV has the
-    tables one below another, told apart by the column "table"; markdown is a page.
+    Distributions in the place of another one, conversion methods, and kernels against their
+    textbook expressions: medians of interleaved repeats with quartiles. If Dr.Jit is installed, a
+    kernel that it compiles is timed as well. CSV has the tables one below another, told apart by
+    the column "table"; markdown is a page that says what they mean.
 
     Examples:
 
@@ -91,7 +90,7 @@ def command(
 
     mdfconv bench --format markdown --png speed-error.png > speed-error.md
     """
-    from mdfconv.studies.bench.measure import measure
+    from mdfconv.studies.bench import measure
 
     outputs = Outputs(csv, json, png, force=force)
     task = _task(reference, parameter, source, target, quick=quick)
@@ -103,7 +102,7 @@ def command(
     if json:
         contents[json] = file_bytes(_json(measurements))
     if png:
-        from mdfconv.studies.bench.figure import draw
+        from mdfconv.studies.bench_page import draw
 
         contents[png] = draw(measurements)
     outputs.write(contents)
@@ -114,8 +113,7 @@ def _task(
     reference: str, parameter: list[float] | None, source: str, target: str, *, quick: bool
 ) -> Task:
     from mdfconv.distributions import one_parameter_distribution, one_parameter_distributions
-    from mdfconv.studies.bench.measure import Task
-    from mdfconv.timing import FULL, QUICK
+    from mdfconv.studies.bench import FULL, QUICK, Task
 
     end = asked_endpoint(reference)
     return Task(
@@ -148,19 +146,17 @@ def _default_lobes(name: str) -> Array:
 
 
 def _print(measurements: Measurements, form: Format, png: Path | None) -> None:
-    from mdfconv.studies.bench import page
+    from mdfconv.studies import bench_page
 
     if form is Format.csv:
         typer.echo(_csv(measurements))
     elif form is Format.json:
         typer.echo(_json(measurements))
     elif form is Format.markdown:
-        typer.echo(page.markdown_page(measurements, png.name if png else None))
+        typer.echo(bench_page.markdown_page(measurements, png.name if png else None))
     else:
-        sentences = page.sentences(measurements)
-        for name, rows in page.tables(measurements).items():
-            write_table(list(rows[0]), rows, form, title=page.title(measurements, name))
-            console().print("\n".join(sentences[name]), "\n", markup=False)
+        for name, rows in bench_page.tables(measurements).items():
+            write_table(list(rows[0]), rows, form, title=bench_page.title(measurements, name))
 
 
 def _csv(measurements: Measurements) -> str:
@@ -172,7 +168,5 @@ def _csv(measurements: Measurements) -> str:
 
 
 def _json(measurements: Measurements) -> str:
-    from mdfconv.studies.bench.page import sentences
-
     content: dict[str, Any] = {"machine": measurements.machine, "sizes": vars(measurements.sizes)}
-    return json_text(content | measurements.records() | {"verdicts": sentences(measurements)})
+    return json_text(content | measurements.records())

@@ -9,7 +9,6 @@ import typer
 from mdfconv.cli import completion
 from mdfconv.cli.options import (
     ForceOption,
-    Format,
     FormatOption,
     OutputOption,
     PngOption,
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from mdfconv.distributions.evaluation import Array
     from mdfconv.studies.furnace import FurnaceModel
 
-_NOT_OF_SPEED = ("normalizer", "masking", "points", "samples", "seed", "png")
 _MOST_POINTS = 1001
 _MOST_SAMPLES = 10_000_000
 # Samples at all points together: some seconds.
@@ -71,10 +69,6 @@ def command(
         typer.Option("--mc", metavar="N", help="Estimate by N random directions a cosine, too."),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="S", help="Of the random numbers.")] = 0,
-    speed: Annotated[
-        bool,
-        typer.Option("--speed", help="Print speed against error of modified Phong's normalizers."),
-    ] = False,
     png: PngOption = None,
     format_: FormatOption = None,
     output: OutputOption = None,
@@ -93,19 +87,11 @@ def command(
     mdfconv furnace --brdf modified-phong --normalizer arvo 100 --format csv
 
     mdfconv furnace --brdf beckmann --g v-cavity 0.3 --mc 10000 --png furnace.png
-
-    mdfconv furnace --brdf modified-phong --speed 100
     """
     import numpy as np
 
     from mdfconv.studies.furnace import furnace_model
 
-    if speed:
-        if brdf != "modified-phong":
-            raise MdfconvError("--speed compares the normalizers of --brdf modified-phong")
-        refuse_given(context, _NOT_OF_SPEED, "does not go with --speed, a table of all normalizers")
-        _write_speed(parameter, format_, Outputs(table=output, force=force))
-        return
     if samples is None:
         refuse_given(context, ["seed"], "goes with --mc")
     if not 2 <= points <= _MOST_POINTS:
@@ -157,11 +143,3 @@ def _rows(
     if samples:
         columns["sampled"], columns["standard_error"] = sampled_albedo(model, cosine, samples, seed)
     return rounded_rows(columns)
-
-
-def _write_speed(exponent: float, form: Format | None, outputs: Outputs) -> None:
-    from mdfconv.studies.bench.normalizers import normalizer_speeds
-
-    rows = normalizer_speeds(exponent)
-    title = f"Normalizers of modified Phong, γ = {exponent:g}"
-    write_table(list(rows[0]), rows, form, outputs, title=title)

@@ -80,7 +80,7 @@ def command(
 
 def _write(recommendation: Recommendation, asked: dict[str, Any], form: Format) -> None:
     rows, reason = recommendation.records(), recommendation.reason
-    columns, answers = list(rows[0]), recommendation.answers
+    columns, answers = list(rows[0]), recommendation.chosen
     sentence = reason[0].upper() + reason[1:]
     if form is Format.json:
         chosen = {use: vars(candidate) for use, candidate in answers.items()}

@@ -54,12 +54,9 @@ def command(
 
     mdfconv stability --part conversions --format markdown
     """
-    from dataclasses import asdict, fields
-
-    from mdfconv.studies.stability import Finding, audit
+    from mdfconv.studies.stability import COLUMNS, audit
 
     outputs = Outputs(table=output, force=force)
-    rows = [asdict(finding) for finding in audit(mdf or (), part)]
-    columns = [field.name for field in fields(Finding)]
+    rows = [finding.record() for finding in audit(mdf or (), part)]
     title = "Hard cases: worst relative errors"
-    write_table(columns, rows, format_, outputs, title=title, secondary=_SECONDARY)
+    write_table(COLUMNS, rows, format_, outputs, title=title, secondary=_SECONDARY)

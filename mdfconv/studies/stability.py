@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import csv
 import warnings
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
 from decimal import Decimal
 from importlib.resources import files
 from itertools import groupby
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -27,7 +27,21 @@ from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvWarning
 from mdfconv.fitting.metrics import metric_named
 
-DTYPES = (np.float64, np.float32, np.float16)
+# Of the kernels. Conversions compute in float64 throughout: float32 rounds input and result.
+_KERNEL_TYPES = (np.float64, np.float32, np.float16)
+_CONVERSION_TYPES = (np.float64, np.float32)
+# Under which fits are compared.
+_FIT_METRICS = ("unit", "energy")
+# Methods of which one direction undoes the other, for every pair, with the printed expressions
+# that they go through.
+_INVERTIBLE = {"half-angle": ("cosine", "from_cosine"), "peak": ("peak_alpha", "from_peak_alpha")}
+# What is stored and read back in the forms of programs.
+_ENCODED = {"mirror-smooth": ("1e-08", "1e-06", "1e-04"), "rough": ("0.25", "0.5", "1")}
+_ENCODED_EXPONENTS = {"mirror-smooth": ("1000", "10000", "60000"), "rough": ("4", "10", "100")}
+# Columns of conversions.csv that are not a target's.
+_KEYS = ("method", "source", "regime", "gamma", "value")
+
+_Rows: TypeAlias = list[dict[str, str]]
 
 
 @dataclass(frozen=True)
@@ -61,6 +75,8 @@ class Finding:
         ``"NaN"`` or ``"inf"`` where it comes to that, and empty where nothing is printed.
     worst : str
         Where `error` is largest.
+    round_trip : bool
+        Whether the rule is applied forth and back.
     """
 
     distribution: str
@@ -73,81 +89,59 @@ class Finding:
     error_in_eps: float | str
     textbook: float | str
     worst: str
+    round_trip: bool = False
+
+    def record(self) -> dict[str, Any]:
+        """Return a row of a table."""
+        return {name: value for name, value in vars(self).items() if name != "round_trip"}
 
 
-class Tally:
-    """Collects the errors of one group and makes the finding of them.
+COLUMNS = [field.name for field in fields(Finding) if field.name != "round_trip"]
 
-    Parameters
-    ----------
-    distribution, rule, regime : str
-        As for `Finding`.
-    dtype : numpy.dtype
-        Type of the values.
+
+@dataclass(frozen=True)
+class Comparison:
+    """Results for some cases of a group beside exact ones, and what each case is, in words.
+
+    The textbook's results are None where nothing is printed.
     """
 
-    def __init__(self, distribution: str, rule: str, regime: str, dtype: np.dtype) -> None:
-        self._group = distribution, rule, regime
-        self._dtype = dtype
-        self._ours: list[float] = []
-        self._textbook: list[float] = []
-        self._cases: list[str] = []
-        self._out_of_range = 0
+    rule: str
+    regime: str
+    values: Array
+    textbook: Array | None
+    exact: Sequence[Decimal]
+    cases: Sequence[str]
+    round_trip: bool = False
 
-    def add(
-        self,
-        values: Array,
-        textbook: Array | None,
-        exact: Sequence[Decimal],
-        cases: Sequence[str],
-    ) -> None:
-        """Compare values of the group's type, and the printed expression's, with exact ones.
 
-        `cases` says in words what each of them is.
-        """
-        self._ours += relative_errors(values, exact)
-        if textbook is not None:
-            self._textbook += relative_errors(textbook, exact)
-        self._cases += cases
-        self._out_of_range += sum(not _in_range(value, self._dtype) for value in exact)
-
-    def finding(self) -> Finding:
-        """Return the worst."""
-        index = int(np.argmax(np.nan_to_num(self._ours, nan=np.inf)))
-        error = self._ours[index]
-        return Finding(
-            *self._group,
-            dtype=self._dtype.name,
-            cases=len(self._ours),
-            out_of_range=self._out_of_range,
-            error=two_digits(error),
-            error_in_eps=two_digits(error / float(np.finfo(self._dtype).eps)),
-            textbook=_worst_of_textbook(self._textbook),
-            worst=self._cases[index],
+def findings(audited: str, comparisons: Iterable[Comparison]) -> Iterator[Finding]:
+    """Yield the worst of each group of a distribution, in the order of their first cases."""
+    groups: dict[tuple[str, str, np.dtype], list[Comparison]] = {}
+    for each in comparisons:
+        groups.setdefault((each.rule, each.regime, each.values.dtype), []).append(each)
+    for (rule, regime, dtype), members in groups.items():
+        errors = [e for each in members for e in relative_errors(each.values, each.exact)]
+        textbook = [
+            error
+            for each in members
+            if each.textbook is not None
+            for error in relative_errors(each.textbook, each.exact)
+        ]
+        index = int(np.argmax(np.nan_to_num(errors, nan=np.inf)))
+        yield Finding(
+            audited,
+            rule,
+            regime,
+            dtype.name,
+            cases=len(errors),
+            out_of_range=sum(not _in_range(e, dtype) for each in members for e in each.exact),
+            error=two_digits(errors[index]),
+            error_in_eps=two_digits(errors[index] / float(np.finfo(dtype).eps)),
+            textbook=_worst_of_textbook(textbook),
+            worst=[case for each in members for case in each.cases][index],
+            round_trip=members[0].round_trip,
         )
-
-
-class Tallies:
-    """The tallies of several groups, in the order in which they were first asked for."""
-
-    def __init__(self) -> None:
-        self._tallies: dict[tuple[str, str, str, str], Tally] = {}
-
-    def of(self, distribution: str, rule: str, regime: str, dtype: Any) -> Tally:
-        """Return the tally of a group."""
-        kind = np.dtype(dtype)
-        key = (distribution, rule, regime, kind.name)
-        return self._tallies.setdefault(key, Tally(distribution, rule, regime, kind))
-
-    def findings(self) -> Iterator[Finding]:
-        """Return the worst of each group."""
-        return (tally.finding() for tally in self._tallies.values())
-
-
-def no_references(audited: Distribution, dtype: Any) -> Iterator[Finding]:
-    """Yield the finding of a distribution for which no exact value is stored."""
-    group = (audited.name, "unit", "no stored references", np.dtype(dtype).name)
-    yield Finding(*group, cases=0, out_of_range=0, error="", error_in_eps="", textbook="", worst="")
 
 
 def relative_errors(values: Array, exact: Sequence[Decimal]) -> list[float]:
@@ -194,33 +188,25 @@ def read_rows(name: str) -> list[dict[str, str]]:
     return list(csv.DictReader(text.splitlines()))
 
 
-_Rows = list[dict[str, str]]
-
-
 def audit_kernels(chosen: Sequence[Distribution]) -> Iterator[Finding]:
-    """Yield the findings of the unit and the normalized forms.
+    """Yield the findings of the unit and the normalized forms, one for each regime and type.
 
-    Parameters
-    ----------
-    chosen : sequence of Distribution
-        What to audit. β is compared as stored: of a β beyond π/2, which float32's π/2 is, the
-        mirrored angle counts. The normalized forms are compared at β = 0; elsewhere they are a
-        multiple of the unit forms.
-
-    Yields
-    ------
-    Finding
-        One for each distribution, form, regime and type.
+    β is compared as stored: of a β beyond π/2, which float32's π/2 is, the mirrored angle counts.
+    The normalized forms are compared at β = 0; elsewhere they are a multiple of the unit forms.
     """
-    cases = {dtype: _read(dtype) for dtype in DTYPES}
+    stored = {dtype: _by_distribution(np.dtype(dtype).name) for dtype in _KERNEL_TYPES}
     for audited in chosen:
-        for dtype, by_name in cases.items():
-            rows = by_name.get(audited.name) or by_name.get(_same_function(audited), [])
-            yield from _findings(audited, rows, dtype) if rows else no_references(audited, dtype)
+        for dtype, rows_of in stored.items():
+            rows = rows_of.get(audited.name) or rows_of.get(_same_function(audited), [])
+            if rows:
+                yield from findings(audited.name, _kernel_comparisons(audited, rows, dtype))
+            else:
+                group = (audited.name, "unit", "no stored references", np.dtype(dtype).name)
+                yield Finding(*group, 0, 0, error="", error_in_eps="", textbook="", worst="")
 
 
-def _read(dtype: type) -> dict[str, _Rows]:
-    rows = read_rows(f"kernels-{np.dtype(dtype).name}.csv")
+def _by_distribution(dtype: str) -> dict[str, _Rows]:
+    rows = read_rows(f"kernels-{dtype}.csv")
     return {name: list(group) for name, group in groupby(rows, lambda row: row["distribution"])}
 
 
@@ -230,14 +216,11 @@ def _same_function(audited: Distribution) -> str:
     return equal.name if equal and equal.same_lobe and equal.same_parameter else ""
 
 
-def _findings(audited: Distribution, rows: _Rows, dtype: Any) -> Iterator[Finding]:
-    tallies = Tallies()
-    keys = ("form", "regime", "parameter", "gamma")
-    for (form, regime, parameter, gamma), group in groupby(
-        rows, lambda row: tuple(row[key] for key in keys)
-    ):
-        members = list(group)
-        beta = np.array([row["beta"] for row in members], dtype=dtype)
+def _kernel_comparisons(audited: Distribution, rows: _Rows, dtype: Any) -> Iterator[Comparison]:
+    for row in rows:
+        form, parameter, gamma = row["form"], row["parameter"], row["gamma"]
+        angles = row["beta"].split()
+        beta = np.array(angles, dtype=dtype)
         p, shape = dtype(parameter), audited
         if audited.second_parameter:
             shape = audited.with_gamma(float(dtype(gamma or audited.gamma)))
@@ -246,28 +229,20 @@ def _findings(audited: Distribution, rows: _Rows, dtype: Any) -> Iterator[Findin
         # float16 overflows where the normalized form of a mirror-smooth surface exceeds 65504.
         with np.errstate(over="ignore"):
             values = evaluate(beta, p)
-        tallies.of(audited.name, form, regime, dtype).add(
+        yield Comparison(
+            form,
+            row["regime"],
             values,
             printed_form(shape, form, beta, p),
-            [Decimal(row["value"]) for row in members],
-            [f"β = {row['beta']}, {where}" for row in members],
+            [Decimal(text) for text in row["value"].split()],
+            [f"β = {angle}, {where}" for angle in angles],
         )
-    return tallies.findings()
 
 
 def printed_form(shape: Distribution, form: str, beta: Array, parameter: Any) -> Array:
-    """Return the printed unit form, or the printed normalized form at the normal.
+    """Return the printed unit form, or for ``"normalized"`` that form at the normal, β = 0.
 
-    Parameters
-    ----------
-    shape : Distribution
-        The distribution, with its γ if it has one.
-    form : str
-        ``"unit"`` or ``"normalized"``.
-    beta : numpy.ndarray
-        Angles, radians; 0 for the normalized form.
-    parameter : numpy scalar
-        The parameter, in the type of the angles.
+    The parameter is a numpy scalar of the type of the angles.
     """
     printed = shape.printed
     arguments = [parameter] + [beta.dtype.type(shape.gamma)] * bool(shape.second_parameter)
@@ -276,20 +251,6 @@ def printed_form(shape: Distribution, form: str, beta: Array, parameter: Any) ->
         off_axis = form == "normalized" and shape.mode(np.asarray(float(parameter))) > 0
         value = np.ones_like(beta) if off_axis else printed.unit(beta, *arguments)
         return value if form == "unit" else value * printed.at_normal(*arguments)
-
-
-# The computation is in float64 throughout: float32 rounds the input and the result.
-_DTYPES = (np.float64, np.float32)
-# What the stored fits keep.
-_FIT_METRICS = ("unit", "energy")
-# Methods of which one direction undoes the other, for every pair, with the printed expressions
-# that they go through.
-_INVERTIBLE = {"half-angle": ("cosine", "from_cosine"), "peak": ("peak_alpha", "from_peak_alpha")}
-_ENCODED = {"mirror-smooth": ("1e-08", "1e-06", "1e-04"), "rough": ("0.25", "0.5", "1")}
-_ENCODED_EXPONENTS = {"mirror-smooth": ("1000", "10000", "60000"), "rough": ("4", "10", "100")}
-
-# Columns of conversions.csv that are not a target's.
-_KEYS = ("method", "source", "regime", "gamma", "value")
 
 
 @dataclass(frozen=True)
@@ -313,44 +274,38 @@ class _Batch:
 def audit_conversions(chosen: Sequence[Distribution]) -> Iterator[Finding]:
     """Yield the findings of all conversions from the chosen distributions.
 
-    Parameters
-    ----------
-    chosen : sequence of Distribution
-        The sources.
-
-    Yields
-    ------
-    Finding
-        One for each source, method, end of the range and type. A round trip is compared with
-        where it started: where a conversion is nearly constant, no stored result leads back.
+    There is one for each source, method, end of the range and type. A round trip is compared with
+    where it started: where a conversion is nearly constant, no stored result leads back.
     """
     formulas, fits = read_rows("conversions.csv"), read_rows("fits.csv")
     for source in chosen:
         fitted = [row for row in fits if row["source"] == source.name]
         for method in list_methods():
-            rows = [
-                row
-                for row in formulas
-                if (row["method"], row["source"]) == (method.name, source.name)
-            ]
-            yield from _formula(method, _formula_batches(source, rows))
+            forward, back = [], []
+            names = (method.name, source.name)
+            rows = [row for row in formulas if (row["method"], row["source"]) == names]
+            for batch in _formula_batches(source, rows):
+                for dtype in _CONVERSION_TYPES:
+                    forward += [_conversion(method, batch, dtype)]
+                    back += _round_trip(method, batch, forward[-1])
+            yield from findings(source.name, [*forward, *back])
             if method.follows_metric:
-                yield from _fits(method, source, fitted)
-        yield from _encodings(source)
+                yield from findings(source.name, _fits(method, source, fitted))
+        yield from findings(source.name, _encodings(source))
 
 
 def _formula_batches(source: Distribution, rows: _Rows) -> Iterator[_Batch]:
     for (regime, gamma), group in groupby(rows, lambda row: (row["regime"], row["gamma"])):
         members = list(group)
         for name in [column for column in members[0] if column not in _KEYS]:
-            answered = [row for row in members if row[name]]
-            if answered:
+            converted = [row for row in members if row[name]]
+            if converted:
                 yield _Batch(
                     _with_gamma(source, gamma),
                     _with_gamma(distribution(name), gamma),
                     regime,
-                    [row["value"] for row in answered],
-                    [Decimal(row[name]) for row in answered],
+                    [row["value"] for row in converted],
+                    [Decimal(row[name]) for row in converted],
                 )
 
 
@@ -365,46 +320,42 @@ def _converted(values: Array, source: Distribution, target: Distribution, method
         return convert(values, Endpoint(source), Endpoint(target), method.name)
 
 
-def _formula(method: Method, batches: Iterator[_Batch]) -> Iterator[Finding]:
-    forward, back = Tallies(), Tallies()
-    for batch in batches:
-        source, target = batch.source, batch.target
-        comes_back = method.name in _INVERTIBLE or exact_route(source, target) is not None
-        for dtype in _DTYPES:
-            values = batch.of_type(dtype)
-            ours = _converted(values, source, target, method)
-            printed = printed_conversion(method, source, target, values)
-            group = batch.regime, dtype
-            forward.of(source.name, method.name, *group).add(
-                ours, printed, batch.exact, batch.cases
-            )
-            if comes_back:
-                if printed is not None:
-                    printed = printed_conversion(method, target, source, printed)
-                back.of(source.name, f"{method.name} and back", *group).add(
-                    _converted(ours, target, source, method),
-                    printed,
-                    [Decimal(float(value)) for value in values],
-                    [f"{case} → {source.name}" for case in batch.cases],
-                )
-    yield from forward.findings()
-    yield from back.findings()
+def _conversion(method: Method, batch: _Batch, dtype: Any) -> Comparison:
+    values = batch.of_type(dtype)
+    return Comparison(
+        method.name,
+        batch.regime,
+        _converted(values, batch.source, batch.target, method),
+        printed_conversion(method, batch.source, batch.target, values),
+        batch.exact,
+        batch.cases,
+    )
+
+
+def _round_trip(method: Method, batch: _Batch, forward: Comparison) -> list[Comparison]:
+    """Return the way back from a conversion, if the method has one that undoes it."""
+    source, target = batch.source, batch.target
+    if method.name not in _INVERTIBLE and exact_route(source, target) is None:
+        return []
+    textbook = forward.textbook
+    if textbook is not None:
+        textbook = printed_conversion(method, target, source, textbook)
+    back = Comparison(
+        f"{method.name} and back",
+        batch.regime,
+        _converted(forward.values, target, source, method),
+        textbook,
+        [Decimal(float(value)) for value in batch.of_type(forward.values.dtype)],
+        [f"{case} → {source.name}" for case in batch.cases],
+        round_trip=True,
+    )
+    return [back]
 
 
 def printed_conversion(
     method: Method, source: Distribution, target: Distribution, values: Array
 ) -> Array | None:
-    """Return what the printed formulas give in the type of the values; None if none is printed.
-
-    Parameters
-    ----------
-    method : Method
-        The method.
-    source, target : Distribution
-        The pair, with their γ.
-    values : numpy.ndarray
-        Parameters of the source.
-    """
+    """Return what the printed formulas give in the type of the values; None if none is printed."""
     with np.errstate(all="ignore"):
         if isinstance(method, FormulaMethod):
             # It holds the formulas as printed.
@@ -424,8 +375,7 @@ def _gammas(end: Distribution, values: Array) -> list[Array]:
     return [np.full_like(values, end.gamma)] if end.second_parameter else []
 
 
-def _fits(method: Method, source: Distribution, rows: _Rows) -> Iterator[Finding]:
-    tallies = Tallies()
+def _fits(method: Method, source: Distribution, rows: _Rows) -> Iterator[Comparison]:
     for (name, regime), group in groupby(rows, lambda row: (row["target"], row["regime"])):
         members = list(group)
         target = distribution(name)
@@ -434,29 +384,28 @@ def _fits(method: Method, source: Distribution, rows: _Rows) -> Iterator[Finding
                 continue
             exact = [Decimal(row[metric.name]) for row in members]
             batch = _Batch(source, target, regime, [row["value"] for row in members], exact)
-            for dtype in _DTYPES:
+            for dtype in _CONVERSION_TYPES:
                 ours = convert(batch.of_type(dtype), source.name, name, method.name, metric=metric)
-                tallies.of(source.name, f"{method.name} {metric.name}", regime, dtype).add(
-                    ours, None, exact, batch.cases
-                )
-    yield from tallies.findings()
+                rule = f"{method.name} {metric.name}"
+                yield Comparison(rule, regime, ours, None, exact, batch.cases)
 
 
-def _encodings(source: Distribution) -> Iterator[Finding]:
-    tallies = Tallies()
+def _encodings(source: Distribution) -> Iterator[Comparison]:
     for encoding in source.encodings:
         label = f"{source.name}:{encoding.name}"
         smooth = source.parameter.larger_is_smoother
         for regime, texts in (_ENCODED_EXPONENTS if smooth else _ENCODED).items():
-            for dtype in _DTYPES:
+            for dtype in _CONVERSION_TYPES:
                 values = np.array(texts, dtype=dtype)
-                tallies.of(source.name, f"{encoding.name} and back", regime, dtype).add(
+                yield Comparison(
+                    f"{encoding.name} and back",
+                    regime,
                     convert(convert(values, source.name, label), label, source.name),
                     None,
                     [Decimal(float(value)) for value in values],
                     [f"{text} → {encoding.name} → {source.parameter.symbol}" for text in texts],
+                    round_trip=True,
                 )
-    yield from tallies.findings()
 
 
 _PARTS = {"kernels": audit_kernels, "conversions": audit_conversions}
@@ -465,6 +414,9 @@ _PARTS = {"kernels": audit_kernels, "conversions": audit_conversions}
 def audit(names: Sequence[str] = (), part: str | None = None) -> Iterator[Finding]:
     """Yield the worst error of every group of hard cases.
 
+    First come the kernels (float64, float32, float16), then the conversions (float64, float32). A
+    distribution without stored references has a finding without cases.
+
     Parameters
     ----------
     names : sequence of str
@@ -472,18 +424,12 @@ def audit(names: Sequence[str] = (), part: str | None = None) -> Iterator[Findin
     part : str, optional
         ``"kernels"`` or ``"conversions"``; both if not given.
 
-    Yields
-    ------
-    Finding
-        First of the kernels (float64, float32, float16), then of the conversions (float64,
-        float32). A distribution without stored references has a finding without cases.
-
     Raises
     ------
     MdfconvError
         If a name is not known.
     """
     chosen = list(dict.fromkeys(map(distribution, names))) or list_distributions()
-    for name, findings in _PARTS.items():
+    for name, audit_part in _PARTS.items():
         if part in (None, name):
-            yield from findings(chosen)
+            yield from audit_part(chosen)

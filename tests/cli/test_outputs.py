@@ -125,8 +125,8 @@ def _here(tmp_path, monkeypatch):
     monkeypatch.setattr(report, "FILES", ("a.md", "README.md"))
     monkeypatch.setattr(Figure, "savefig", lambda figure, file, **_: file.write(b"drawn"))
     monkeypatch.setattr("mdfconv.render.page.comparison_page", lambda *_: b"page")
-    monkeypatch.setattr("mdfconv.studies.bench.measure.measure", lambda *_: None)
-    monkeypatch.setattr("mdfconv.studies.bench.figure.draw", lambda _: b"drawn")
+    monkeypatch.setattr("mdfconv.studies.bench.measure", lambda *_: None)
+    monkeypatch.setattr("mdfconv.studies.bench_page.draw", lambda _: b"drawn")
     for name in ("_csv", "_json"):
         monkeypatch.setattr(f"mdfconv.cli.bench_command.{name}", lambda _: "measured")
     monkeypatch.setattr("mdfconv.studies.stability.audit", lambda *_: [])

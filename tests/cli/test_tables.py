@@ -63,7 +63,6 @@ SAME = [
 ]
 TIMED = [
     "recommend --from beckmann 0.2",
-    "furnace --brdf modified-phong --speed 100",
     pytest.param("bench --quick", marks=pytest.mark.slow),
 ]
 NO_TABLE = {"report", "texture"}

@@ -10,7 +10,7 @@ from mdfconv.conversion.explanation import remaining_error
 from mdfconv.distributions import one_parameter_distributions
 from mdfconv.distributions.equivalence import exact_route
 from mdfconv.fitting.metrics import list_metrics, metric_named
-from mdfconv.studies.bench.methods import answers, covering
+from mdfconv.recommend import answers, covering
 from tests.fitting.brute_force import Problem
 
 MAPPED = [mdf.name for mdf in one_parameter_distributions() if mdf.map_variables]

@@ -17,7 +17,8 @@ from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text, markdown_text
-from mdfconv.studies.bench.methods import answers, as_wide
+from mdfconv.recommend import answers
+from mdfconv.studies.bench import as_wide
 from mdfconv.studies.report.artefact import Artefact
 from mdfconv.studies.report.prose import percent, wrapped
 

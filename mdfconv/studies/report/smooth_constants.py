@@ -13,7 +13,7 @@ from itertools import permutations
 from mdfconv.distributions import Distribution, one_parameter_distributions
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.fitting.solve import fit
-from mdfconv.studies.bench.methods import as_wide
+from mdfconv.studies.bench import as_wide
 
 # Beckmann's m_B for lobes of the same half width. Schlick's form nears its limit in proportion
 # to m_B, the others to its square.

@@ -103,11 +103,7 @@ def _kernel_prose(findings: Sequence[Finding]) -> str:
 
 
 def _conversion_prose(findings: Sequence[Finding]) -> str:
-    trips = [
-        finding
-        for finding in findings
-        if finding.rule.endswith(" and back") and finding.regime == "rough"
-    ]
+    trips = [finding for finding in findings if finding.round_trip and finding.regime == "rough"]
     hardest = max(trips, key=lambda trip: float(trip.error or 0))
     return fill(
         "The worst over all sources. For a smooth surface cos β_half rounds to 1, and the printed "

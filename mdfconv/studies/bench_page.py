@@ -1,0 +1,271 @@
+"""The measurements of speed against error for people: tables in few digits, a page, a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+
+from mdfconv.output.figures import encoded, line_style, new_figure
+from mdfconv.output.records import markdown_text
+from mdfconv.studies.bench import LOOP, Measurements, Substitute
+from mdfconv.studies.pages import fill
+from mdfconv.timing import NOISE, Spread
+
+TITLES = {
+    "substitutes": "Distributions as substitutes",
+    "methods": "Conversion methods",
+    "kernels": "Kernels",
+}
+
+
+def tables(measurements: Measurements) -> dict[str, list[dict[str, Any]]]:
+    """Return the tables by name, in rounded cells, a median with its quartiles in one."""
+    return {
+        "substitutes": [
+            {
+                "reference": f"{row.reference} {row.reference_parameter:g}",
+                "distribution": row.distribution,
+                "parameter": _rounded(row.parameter, 5),
+                "operations": row.operations,
+                "float32 ns": _times(row.ns_float32),
+                "float64 ns": _times(row.ns_float64),
+                "RMSE": _rounded(row.rmse),
+                "max error": _rounded(row.max_error),
+                "energy error": _rounded(row.energy_error),
+                "unbeaten": unbeaten,
+            }
+            for rows in _by_reference(measurements)
+            for row, unbeaten in zip(rows, _unbeaten(rows), strict=True)
+        ],
+        "methods": [
+            {
+                "method": row.method,
+                "metric": row.metric,
+                "values": row.values,
+                "ns a value": _times(row.nanoseconds),
+                "values per second": f"{_rounded(row.per_second.median):,.0f}",
+                "parameter error": _rounded(row.parameter_error),
+                "largest": _rounded(row.parameter_error_max),
+                "RMSE": _rounded(row.rmse),
+                "largest RMSE": _rounded(row.rmse_max),
+                "answered": f"{100 * row.answered:.3g} %",
+            }
+            for row in measurements.methods
+        ],
+        "kernels": [
+            {
+                "distribution": row.distribution,
+                "type": row.precision,
+                "kernel ns": _times(row.kernel_ns),
+                "textbook ns": _times(row.textbook_ns),
+                "textbook / kernel": _rounded(row.speedup),
+                "Dr.Jit ns": _times(row.drjit_ns) if row.drjit_ns else "",
+            }
+            for row in measurements.kernels
+        ],
+    }
+
+
+def title(measurements: Measurements, name: str) -> str:
+    """Return the heading of a table."""
+    pair = measurements.methods[0]
+    return TITLES[name] + (f", {pair.source} → {pair.target}" if name == "methods" else "")
+
+
+def markdown_page(measurements: Measurements, picture: str | None = None) -> str:
+    """Return the measurements as a Markdown page, which shows a picture if one is named."""
+    loops = {row.metric: row for row in measurements.methods if row.method == LOOP}
+    gains = [
+        row.per_second.median / loops[row.metric].per_second.median
+        for row in measurements.methods
+        if row.method == "fit"
+    ]
+    formulas = [row for row in measurements.methods if row.method not in ("fit", LOOP)]
+    quickest = max(formulas, key=lambda row: row.per_second.median)
+    shares = {
+        precision: [1 / row.speedup for row in measurements.kernels if row.precision == precision]
+        for precision in ("float32", "float64")
+    }
+    pair = measurements.methods[0]
+    return fill(
+        "speed-error",
+        least_gain=min(gains),
+        most_gain=max(gains),
+        loop_error=max(row.parameter_error_max for row in loops.values()),
+        quickest=vars(quickest),
+        per_second=_rounded(quickest.per_second.median, 2),
+        least_share={name: min(values) for name, values in shares.items()},
+        most_share={name: max(values) for name, values in shares.items()},
+        machine=measurements.machine,
+        sizes=vars(measurements.sizes),
+        picture=f"![Error against time, distributions and methods]({picture})\n\n"
+        if picture
+        else "",
+        pair=f"{pair.source} → {pair.target}",
+        **{name: markdown_text(list(rows[0]), rows) for name, rows in tables(measurements).items()},
+    )
+
+
+def _by_reference(measurements: Measurements) -> list[list[Substitute]]:
+    """Return the substitutes of each reference and parameter."""
+    groups: dict[tuple[str, float], list[Substitute]] = {}
+    for row in measurements.substitutes:
+        groups.setdefault((row.reference, row.reference_parameter), []).append(row)
+    return list(groups.values())
+
+
+def _unbeaten(rows: Sequence[Substitute]) -> list[bool]:
+    """Return which substitutes none is both quicker than, beyond noise, and nearer."""
+    unbeaten = front([(row.ns_float32.median, row.rmse) for row in rows], NOISE)
+    return [number in unbeaten for number in range(len(rows))]
+
+
+def front(points: Sequence[tuple[float, float]], tie: float = 0.0) -> list[int]:
+    """Return which points are the Pareto front of two costs, the first cost rising.
+
+    First costs count as equal if one exceeds the other by at most the share `tie`. Of equal
+    points the first is on the front; a point with NaN never is.
+
+    Examples
+    --------
+    >>> front([(3.0, 0.0), (1.0, 0.2), (2.0, 0.3), (1.0, 0.2)])
+    [1, 0]
+    """
+    indices: list[int] = []
+    lowest = float("inf")
+    comparable = [index for index, point in enumerate(points) if not np.isnan(point[0])]
+    for index in sorted(comparable, key=lambda index: points[index]):
+        cost, error = points[index]
+        if error < lowest:
+            lowest = error
+            while indices and cost <= (1 + tie) * points[indices[-1]][0]:
+                indices.pop()
+            indices.append(index)
+    return indices
+
+
+def _rounded(value: float, digits: int = 3) -> float:
+    return float(f"{value:.{digits}g}")
+
+
+def _times(times: Spread) -> str:
+    median, low, high = (
+        f"{value:#.3g}" if value < 100 else f"{_rounded(value):,.0f}" for value in times
+    )
+    return f"{median} ({low}–{high})"
+
+
+_SIZE = (11.0, 6.5)  # inches
+_MARKERS = "osD^vPX*<>hp"
+# Tell apart variants of one name: parameters of the reference, metrics of a method.
+_FILLS = ("full", "none", "left", "top", "right", "bottom")
+_FRONTS = ("-", "--", ":", "-.")
+_COLORS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_ROUNDING = 1e-12  # smaller errors are none
+
+
+@dataclass(frozen=True)
+class _Point:
+    name: str
+    variant: str
+    nanoseconds: Spread
+    error: float
+
+
+def draw(measurements: Measurements, dpi: int = 120) -> bytes:
+    """Return a PNG of error against time, of distributions and of methods.
+
+    Low and left is better. What has no error to show is left out.
+    """
+    figure = new_figure(*_SIZE)
+    left, right = figure.subplots(1, 2)
+    substitutes = [
+        _Point(
+            row.distribution,
+            f"for {row.reference} {row.reference_parameter:.4g}",
+            row.ns_float32,
+            row.rmse,
+        )
+        for row in measurements.substitutes
+    ]
+    methods = [
+        _Point(row.method, f"metric {row.metric}", row.nanoseconds, row.parameter_error)
+        for row in measurements.methods
+    ]
+    names = dict.fromkeys(point.name for point in methods)
+    _draw_panel(left, substitutes, {p.name: line_style(p.name)["color"] for p in substitutes})
+    _draw_panel(right, methods, dict(zip(names, cycle(_COLORS), strict=False)))
+    left.set(
+        title=TITLES["substitutes"],
+        xlabel="time of an evaluation, float32 [ns]",
+        ylabel="RMSE of the best fit, unit form",
+    )
+    _label_few_decades(left.xaxis)
+    right.set(
+        title=title(measurements, "methods"),
+        xlabel="time of a conversion [ns]",
+        ylabel="median relative error of the parameter against fit",
+    )
+    return encoded(figure, dpi=dpi)
+
+
+def _label_few_decades(axis: Any) -> None:
+    """Label an axis that has too few powers of ten to be read between them."""
+    # Not before `new_figure` has prepared Matplotlib.
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _draw_panel(axes: Any, points: Iterable[_Point], colors: dict[str, str]) -> None:
+    """Draw points with their quartiles, the Pareto front of each variant, and a legend."""
+    points = [point for point in points if np.isfinite(point.error)]
+    variants = list(dict.fromkeys(point.variant for point in points))
+    shapes = dict(zip(colors, cycle(_MARKERS), strict=False))
+    fills = dict(zip(variants, cycle(_FILLS), strict=False))
+    lines = dict(zip(variants, cycle(_FRONTS), strict=False))
+    for variant in variants:
+        own = [point for point in points if point.variant == variant]
+        costs = [(point.nanoseconds.median, point.error) for point in own]
+        corners = [costs[index] for index in front(costs, NOISE)]
+        style = {"color": "0.55", "linestyle": lines[variant], "linewidth": 1.2}
+        axes.step(*zip(*corners, strict=True), where="post", zorder=1, **style)
+        for point in own:
+            median, low, high = point.nanoseconds
+            axes.errorbar(
+                median,
+                point.error,
+                xerr=[[median - low], [high - median]],
+                elinewidth=0.8,
+                fillstyle=fills[variant],
+                marker=shapes[point.name],
+                color=colors[point.name],
+                markerfacecoloralt="white",
+                linestyle="",
+            )
+    handles = [
+        axes.plot([], [], marker=shapes[name], color=colors[name], linestyle="", label=name)[0]
+        for name in colors
+    ] + [
+        axes.plot(
+            [], [], marker="o", color="0.4", fillstyle=fills[name], markerfacecoloralt="white",
+            linestyle=lines[name], label=name,
+        )[0]
+        for name in variants
+    ]  # fmt: skip
+    axes.legend(
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=8,
+        title="lines: what nothing is both quicker and nearer than", title_fontsize=8,
+    )  # fmt: skip
+    # Linear below the smallest error, so that an error of 0 is shown.
+    errors = [point.error for point in points if point.error > _ROUNDING]
+    smallest = min(errors, default=1.0)
+    axes.set_yscale("symlog", linthresh=smallest)
+    axes.set_ylim(bottom=-0.2 * smallest)
+    axes.set_xscale("log")

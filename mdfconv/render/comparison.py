@@ -181,7 +181,7 @@ class Rendering:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PictureComparison:
     """A reference's picture and those of its substitutes under each rule.
 
     Parameters
@@ -281,7 +281,7 @@ def compare(
     scene: Scene,
     source: str | Endpoint = REFERENCE,
     targets: Sequence[str | Endpoint] = DRAWN,
-) -> Comparison:
+) -> PictureComparison:
     """Render a surface and its substitutes.
 
     Parameters
@@ -321,7 +321,7 @@ def compare(
     relative = _scale(rendered[reference])
     shown = {surface: relative(one) for surface, one in rendered.items()}
     rows = {label: [shown[one] for one in surfaces] for label, surfaces in converted.items()}
-    return Comparison(scene, shown[reference], rows, position, frame)
+    return PictureComparison(scene, shown[reference], rows, position, frame)
 
 
 def _closeup_frame(extent: float, size: int) -> Frame:

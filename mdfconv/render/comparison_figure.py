@@ -15,7 +15,7 @@ from mdfconv.brdf.fresnel import material
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics.base import srgb
 from mdfconv.output.figures import encoded, line_style, new_figure
-from mdfconv.render.comparison import Comparison, Rendering
+from mdfconv.render.comparison import PictureComparison, Rendering
 from mdfconv.render.sphere import MARGIN, Frame
 
 # In inches: a picture, which is larger where it has more pixels, what its caption above and the
@@ -45,7 +45,7 @@ _LEAST_SCALE = 1 / 255
 Bounds: TypeAlias = tuple[float, float, float, float]
 
 
-def draw_comparison(comparison: Comparison, dpi: int = 120) -> bytes:
+def draw_comparison(comparison: PictureComparison, dpi: int = 120) -> bytes:
     """Return a PNG: for each conversion pictures and differences, and the sections beneath."""
     rules, columns = len(comparison.rows), 1 + max(map(len, comparison.rows.values()))
     side = max(_PICTURE, comparison.scene.size / dpi)
@@ -72,7 +72,7 @@ def draw_comparison(comparison: Comparison, dpi: int = 120) -> bytes:
     return encoded(figure, dpi=dpi)
 
 
-def _title(comparison: Comparison) -> str:
+def _title(comparison: PictureComparison) -> str:
     scene, reference = comparison.scene, comparison.reference
     reflected = f"{material(scene.material).name}, " if scene.material else ""
     colored = reference.image.ndim == 3
@@ -118,7 +118,7 @@ class _PictureTable:
         self.axes.indicate_inset(bounds, edgecolor=color, alpha=1)
 
 
-def _draw_pictures(table: _PictureTable, comparison: Comparison) -> None:
+def _draw_pictures(table: _PictureTable, comparison: PictureComparison) -> None:
     """Draw a row of pictures for each rule."""
     background = _background(comparison.frame)
     for rule_number, (rule, renderings) in enumerate(comparison.rows.items()):
@@ -129,7 +129,7 @@ def _draw_pictures(table: _PictureTable, comparison: Comparison) -> None:
             table.show(2 * rule_number, column, displayed_pixels(light), caption)
 
 
-def _draw_differences(table: _PictureTable, comparison: Comparison) -> float:
+def _draw_differences(table: _PictureTable, comparison: PictureComparison) -> float:
     """Draw how much brighter or darker than the reference each is; return what the colours end at.
 
     The place beneath the reference shows the sphere of which the pictures are a part.
@@ -193,7 +193,7 @@ def _draw_bar(axes: Any, scale: float, reference: Rendering) -> None:
     axes.set_xlabel(label, fontsize=_FONT)
 
 
-def _draw_sections(axes: Sequence[Any], comparison: Comparison) -> None:
+def _draw_sections(axes: Sequence[Any], comparison: PictureComparison) -> None:
     """Draw the luminance through the highlight for each rule, on one scale."""
     position, reference = comparison.position, comparison.reference
     seen = position[reference.section > _LOWEST]

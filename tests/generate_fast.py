@@ -14,9 +14,9 @@ import numpy as np
 
 import mdfconv
 from mdfconv.distributions import one_parameter_distributions
-from mdfconv.distributions.equivalence import exact_route, to_root
+from mdfconv.distributions.endpoint import exact_route, to_root
 from mdfconv.fitting import maps
-from mdfconv.fitting.map_making import MapMaker, Piece
+from mdfconv.fitting.maps import MapMaker, Piece
 from mdfconv.fitting.metrics import list_metrics, metric_named
 from mdfconv.fitting.solve import FitCurve, cold_fit
 
@@ -64,8 +64,8 @@ class Pair(MapMaker):
 
     def answer(self, parameter):
         """Return the fits' parameters, NaN where there is none that is usable."""
-        got = self.curve(parameter).parameter
-        cold = np.isnan(got)
+        attempt = self.curve(parameter)
+        got, cold = attempt.fits, ~attempt.settled
         if cold.any():
             fits = cold_fit(self.source, parameter[cold], self.target, self.metric)
             got[cold] = fits.parameter
@@ -135,6 +135,19 @@ def needs_map(metric_name, source, target):
     return metric_named(metric_name).ratio(*roots) is None
 
 
+def pack(made):
+    """Return maps as the arrays of the data file."""
+    pieces = [piece for stored in made.values() for piece in stored.coefficients]
+    return {
+        "names": np.array(list(made)),
+        "factored": np.array([stored.factored for stored in made.values()]),
+        "pieces": np.array([len(stored.coefficients) for stored in made.values()]),
+        "terms": np.array([piece.size for piece in pieces]),
+        "edges": np.concatenate([stored.edges for stored in made.values()]),
+        "coefficients": np.concatenate(pieces),
+    }
+
+
 def main(path=maps.FILE):
     """Write the data file."""
     keys = [
@@ -149,7 +162,7 @@ def main(path=maps.FILE):
             made[key] = entry
             print(f"{key}: {summary}", flush=True)
     Path(path).parent.mkdir(exist_ok=True)
-    np.savez_compressed(path, **maps.pack(made))
+    np.savez_compressed(path, **pack(made))
     print(f"{path}: {Path(path).stat().st_size} bytes")
 
 

@@ -54,8 +54,10 @@ class PowerSlope(CubicSlope):
     """The same with a free power: D̄ = (1+t²)² (1 + t²/((k−1) a²))^(−k)."""
 
     name = "power-slope"
+    operations = 27
     parameters = (
-        Parameter("alpha", "a", (0.01, 0.8), upper=0.85, upper_closed=True),
+        # Up to here the maximum is at the normal, whatever the power.
+        Parameter("alpha", "a", (0.01, 0.7), upper=0.7, upper_closed=True),
         Parameter("power", "k", (3.0, 9.0), 2.5, default=3.0, fit_range=(2.6, 40.0)),
     )
 

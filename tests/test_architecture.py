@@ -48,7 +48,6 @@ ABOUT_PARTICULAR_ONES = {
 }
 # Modules outside the command line that may quote options, each with the reason.
 QUOTES_OPTIONS = {
-    "scene/gltf/factors.py": "the command that lists what programs store",
     "scene/material_files.py": "where the command line says that files go",
     "measured/analysis.py": "limits that are read from the command line",
     "measured/readers/text.py": "how the command line says what angles are of",

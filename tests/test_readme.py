@@ -70,7 +70,7 @@ def test_python_examples():
     assert module.attempted
 
 
-@pytest.mark.parametrize("module", ["mdfconv.conversion.arrays", "mdfconv.distributions"])
+@pytest.mark.parametrize("module", ["mdfconv.conversion.values", "mdfconv.distributions"])
 def test_docstring_examples(module):
     found = doctest.testmod(__import__(module, fromlist=["_"]))
     assert found.failed == 0

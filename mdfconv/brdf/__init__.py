@@ -1,1 +1,7 @@
 """What a picture needs around the distribution: Fresnel, masking, and the BRDF itself."""
+
+from mdfconv.brdf.fresnel import conductor, dielectric
+from mdfconv.brdf.microfacet import MASKINGS, Microsurface
+from mdfconv.brdf.reflection import BRDFS
+
+__all__ = ["BRDFS", "MASKINGS", "Microsurface", "conductor", "dielectric"]

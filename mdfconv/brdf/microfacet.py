@@ -32,8 +32,7 @@ def direction(theta: Array | float, phi: Array | float = 0.0) -> Array:
 
 def dot(a: Array, b: Array) -> Array:
     """Return the scalar product over the last axis."""
-    product: Array = np.einsum("...i,...i->...", a, b)
-    return product
+    return np.einsum("...i,...i->...", a, b)
 
 
 def unit(vectors: Array) -> Array:
@@ -59,8 +58,7 @@ def half_vector(light: Array, view: Array) -> Array:
 
 def above(light: Array, view: Array) -> NDArray[np.bool_]:
     """Return where light and viewer both are above the surface."""
-    both: NDArray[np.bool_] = (light[..., 2] > 0) & (view[..., 2] > 0)
-    return both
+    return (light[..., 2] > 0) & (view[..., 2] > 0)
 
 
 def polar_angle(vectors: Array) -> Array:
@@ -277,8 +275,7 @@ def _pair(parameter: Roughness) -> tuple[float, float]:
 
 def _faces(omega: Array, m: Array) -> NDArray[np.bool_]:
     """Return where directions see the same side of the facet and of the surface."""
-    seen: NDArray[np.bool_] = dot(omega, m) * omega[..., 2] > 0
-    return seen
+    return dot(omega, m) * omega[..., 2] > 0
 
 
 Masking: TypeAlias = Callable[[Array, Array, Array], Array]

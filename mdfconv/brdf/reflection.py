@@ -10,7 +10,6 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
-from scipy.special import betainc, poch
 
 from mdfconv.brdf.fresnel import Fresnel
 from mdfconv.brdf.microfacet import Brdf, Masking, Microsurface, above, mirrored, v_cavity
@@ -124,6 +123,8 @@ def mallett_yuksel(cosine: Array, exponent: float) -> Array:
     2πc + √π R (s^γ − c (γ/2) B(s²; γ/2, ½)) becomes πc (1 + I(c²; ½, γ/2)) + √π R s^γ: a sum
     of positive terms, which keeps its digits from γ = 0 to 10⁶ and from normal to grazing.
     """
+    from scipy.special import betainc, poch
+
     half = 0.5 * exponent
     ratio = 1 / poch(half + 0.5, 0.5)
     with np.errstate(divide="ignore", invalid="ignore"):

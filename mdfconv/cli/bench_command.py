@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.names import asked_endpoint
-from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption
+from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption, asked_endpoint
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import form_of, progress, table_text, write_table
 from mdfconv.output.files import file_bytes

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.names import asked_endpoint
 from mdfconv.cli.options import (
     DpiOption,
     FolderOption,
@@ -21,6 +20,7 @@ from mdfconv.cli.options import (
     FormatOption,
     FromOption,
     MethodOption,
+    asked_endpoint,
     chosen_metric,
     refuse_idle_metric,
 )
@@ -34,7 +34,7 @@ from mdfconv.registry import ALL
 
 if TYPE_CHECKING:
     from mdfconv.distributions.endpoint import Endpoint
-    from mdfconv.render.comparison import ConversionRule, Scene
+    from mdfconv.render.comparison import PictureRule, Scene
 
 _COLUMNS = (
     "figure", "conversion", "distribution", "parameter", "rmse_linear", "psnr_linear",
@@ -206,7 +206,7 @@ def command(
     write_table(_COLUMNS, rows, form, title=title)
 
 
-def _words(scene: Scene, rules: Sequence[ConversionRule], targets: Sequence[str]) -> list[str]:
+def _words(scene: Scene, rules: Sequence[PictureRule], targets: Sequence[str]) -> list[str]:
     """Return words for names of files: for all that is not as usual but the number of pixels."""
     from mdfconv.conversion import method_named
     from mdfconv.render.comparison import Scene, default_rules
@@ -252,7 +252,7 @@ def _targets(source: Endpoint, names: Sequence[str]) -> list[Endpoint]:
 
 
 def _answering(
-    values: Iterable[float], rules: Sequence[ConversionRule], source: Endpoint, ends: list[Endpoint]
+    values: Iterable[float], rules: Sequence[PictureRule], source: Endpoint, ends: list[Endpoint]
 ) -> list[Endpoint]:
     """Return the targets to which all values can be converted; say why the others are left out."""
     from mdfconv.conversion import convert
@@ -285,10 +285,10 @@ def _surfaces(source: Endpoint, values: list[float] | None) -> Mapping[str, floa
     return PAPER_FIGURES
 
 
-def _rules(method: str | None, metric: str | None, exposure: float) -> list[ConversionRule]:
+def _rules(method: str | None, metric: str | None, exposure: float) -> list[PictureRule]:
     from mdfconv.conversion import method_named
     from mdfconv.fitting.metrics import metric_named
-    from mdfconv.render.comparison import ConversionRule, default_rules
+    from mdfconv.render.comparison import PictureRule, default_rules
 
     if method is None and metric is None:
         return default_rules(exposure)
@@ -296,4 +296,4 @@ def _rules(method: str | None, metric: str | None, exposure: float) -> list[Conv
     if chosen.setting == "exposure":
         # A screen's picture is exposed as the scene is.
         chosen = chosen_metric(chosen.name, exposure)
-    return [ConversionRule(method_named(method or "fit").name, chosen)]
+    return [PictureRule(method_named(method or "fit").name, chosen)]

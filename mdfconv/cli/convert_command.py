@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+import sys
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from mdfconv.cli.numbers import NumberBlock, read_blocks
 from mdfconv.cli.options import (
     ExposureOption,
     Format,
@@ -35,17 +36,22 @@ from mdfconv.cli.tables import (
     value_text,
 )
 from mdfconv.conversion import Conversion, explain, list_methods
-from mdfconv.conversion.arrays import FREE, Gamma
-from mdfconv.conversion.explanation import results_and_cautions
+from mdfconv.conversion.explanation import explained
+from mdfconv.conversion.values import FREE, ConversionRule, Gamma, Value, holds_pairs
 from mdfconv.distributions import list_distributions, one_parameter_distributions
 from mdfconv.distributions.endpoint import endpoint, with_specular
-from mdfconv.distributions.parameter import number_text
+from mdfconv.distributions.parameter import number_text, percent_hint
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
+from mdfconv.registry import ALL
 
 # With more values than this, the table leaves out what the other methods would give.
 _VALUES_WITH_ALTERNATIVES = 10
-_EVERY = "all"
+_INPUT = "-"
+# Characters of standard input read at a time: some hundred thousand numbers.
+_BLOCK = 1 << 21
+# As a pair this is no surface: one of its axes would be a mirror.
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?0,\d+\s*\Z")
 
 
 def command(
@@ -92,119 +98,147 @@ def command(
     seq 0.1 0.1 0.4 | mdfconv convert --from ggx --to beckmann --method half-angle -
     """
     form = form_of(format_, in_pipe=Format.plain)
-    rule = _ValueRule(method, asked_metric(metric, exposure), exposure, chosen_gamma(gamma))
-    every = target.strip().lower() == _EVERY
+    asked, fixed_or_free = asked_metric(metric, exposure), chosen_gamma(gamma)
+    every, free = target.strip().lower() == ALL, fixed_or_free == FREE
     source, target = with_specular(source, source if every else target, specular)
-    if form is Format.plain and not every and rule.gamma != FREE:
-        _stream(read_blocks(values), source, target, rule)
+    if form is Format.plain and not every and not free:
+        _stream(read_blocks(values), ConversionRule(source, target, method, asked, fixed_or_free))
         return
     numbers = [number for block in read_blocks(values) for number in block.numbers]
-    targets = _targets(numbers, source) if every else [target]
-    conversions, refusals = _convert(numbers, source, targets, rule, errors=form != Format.plain)
-    if refusals and (not every or not conversions):
+    groups: list[list[Conversion]] = []
+    refusals: list[MdfconvError] = []
+    for name in _targets(numbers, source) if every else [target]:
+        own = fixed_or_free if not every or _takes_gamma(source, name, free=free) else None
+        errors = form is not Format.plain
+        try:
+            groups.append(
+                explain(numbers, source, name, method, metric=asked, gamma=own, errors=errors)
+            )
+        except MdfconvError as error:
+            refusals.append(error)
+    if refusals and (not every or not groups):
         raise refusals[0]
     for refusal in refusals:
         tell(f"left out: {refusal}")
     if form is Format.plain:
-        _write_plain(conversions, named=every, free=rule.gamma == FREE)
+        _write_plain(groups, named=every, free=free)
     elif form is Format.table:
-        _write_tables(conversions, rule)
+        for group in groups:
+            _print_group(group, fixed_or_free, exposure)
     else:
-        records = [_record(conversion) for group in conversions for conversion in group]
+        records = [_record(conversion) for group in groups for conversion in group]
         columns = [name for name in records[0] if any(r[name] is not None for r in records)]
         typer.echo(table_text(columns, records, form))
 
 
-@dataclass(frozen=True)
-class _ValueRule:
-    """How to convert: the options of the command that all targets share."""
-
-    method: str | None
-    metric: Metric | None
-    exposure: float | None
-    gamma: Gamma
-
-    def explain(self, values: Any, source: str, target: str, *, errors: bool) -> list[Conversion]:
-        options: dict[str, Any] = {"metric": self.metric, "gamma": self.gamma, "errors": errors}
-        return explain(values, source, target, self.method, **options)
-
-    def results(
-        self, block: NumberBlock, source: str, target: str
-    ) -> tuple[list[str], Sequence[str]]:
-        """Return the results of a block as text, and what they call for."""
-        if block.has_pairs:
-            found = self.explain(block.numbers, source, target, errors=False)
-            texts = [text for conversion in found for text in conversion.cautions]
-            return [value_text(conversion.result) for conversion in found], texts
-        options: dict[str, Any] = {"metric": self.metric, "gamma": self.gamma}
-        numbers = np.array(block.numbers, dtype=float)
-        stored, cautions = results_and_cautions(numbers, source, target, self.method, **options)
-        return list(map(number_text, stored.tolist())), cautions
-
-    def others(self, chosen: Conversion) -> Iterator[_ValueRule]:
-        """Yield the other methods under the metric of an answer."""
-        for method in list_methods():
-            if method.name != chosen.method and (self.gamma != FREE or method.name == "fit"):
-                yield replace(self, method=method.name, metric=metric_named(chosen.metric))
-
-    def under_other_metrics(self, chosen: Conversion) -> Iterator[_ValueRule]:
-        """Yield the fits under the other metrics."""
-        for metric in every_metric(self.exposure):
-            if str(metric) != chosen.metric:
-                yield replace(self, method=None, metric=metric)
-
-
-def _targets(numbers: list[Any], source: str) -> list[str]:
+def _targets(numbers: list[Value], source: str) -> list[str]:
     """Return the distributions that `all` stands for: those that take such values."""
     own = endpoint(source).distribution
     targets = one_parameter_distributions()
-    if any(isinstance(number, tuple) for number in numbers):
+    if holds_pairs(numbers):
         targets = [target for target in list_distributions() if target.anisotropic]
     return [target.name for target in targets if target is not own]
 
 
-def _convert(
-    numbers: list[Any], source: str, targets: list[str], rule: _ValueRule, *, errors: bool
-) -> tuple[list[list[Conversion]], list[MdfconvError]]:
-    """Return the conversions to each target, and why a target has none."""
-    conversions, refusals = [], []
-    for target in targets:
-        own = rule
-        if len(targets) > 1 and rule.gamma is not None and not _takes_gamma(source, target, rule):
-            own = replace(rule, gamma=None)
-        try:
-            conversions.append(own.explain(numbers, source, target, errors=errors))
-        except MdfconvError as error:
-            refusals.append(error)
-    return conversions, refusals
-
-
-def _takes_gamma(source: str, target: str, rule: _ValueRule) -> bool:
+def _takes_gamma(source: str, target: str, *, free: bool) -> bool:
     """Return whether a γ means something for one of many targets."""
-    names = [target] if rule.gamma == FREE else [source, target]
+    names = [target] if free else [source, target]
     return any(endpoint(name).distribution.second_parameter for name in names)
 
 
-def _stream(blocks: Iterator[NumberBlock], source: str, target: str, rule: _ValueRule) -> None:
+@dataclass(frozen=True)
+class NumberBlock:
+    """Values that are converted together, and their lines if they are from standard input."""
+
+    numbers: list[Value]
+    lines: list[int]
+
+
+def read_blocks(values: list[str]) -> Iterator[NumberBlock]:
+    """Yield the values of the arguments, with standard input in place of ``-``."""
+    if values.count(_INPUT) > 1:
+        raise MdfconvError("standard input can be read only once: give one -")
+    numbers: list[Value] = []
+    for position, text in enumerate(values, start=1):
+        if text == _INPUT:
+            if numbers:
+                yield NumberBlock(numbers, [])
+                numbers = []
+            yield from _input_blocks()
+        else:
+            where = f"value {position} of {len(values)}: " if len(values) > 1 else ""
+            numbers.append(_number(text, where))
+    if numbers:
+        yield NumberBlock(numbers, [])
+
+
+def _input_blocks() -> Iterator[NumberBlock]:
+    if sys.stdin is None:
+        raise MdfconvError("standard input is closed")
+    start, empty = 1, True
+    try:
+        while lines := sys.stdin.readlines(_BLOCK):
+            if start == 1:
+                lines[0] = lines[0].removeprefix("\ufeff")
+            block = _block(lines, start)
+            start += len(lines)
+            if block.numbers:
+                empty = False
+                yield block
+    except UnicodeDecodeError:
+        raise MdfconvError("standard input is not text") from None
+    if empty:
+        raise MdfconvError("standard input holds no values")
+
+
+def _block(lines: list[str], start: int) -> NumberBlock:
+    try:
+        return NumberBlock(list(map(float, lines)), list(range(start, start + len(lines))))
+    except ValueError:
+        # Pairs and blank lines, or a mistake.
+        kept = [(line.strip(), number) for number, line in enumerate(lines, start) if line.strip()]
+        numbers = [_number(text, f"line {number} of standard input: ") for text, number in kept]
+        return NumberBlock(numbers, [number for _, number in kept])
+
+
+def _number(text: str, where: str) -> Value:
+    try:
+        parts = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise MdfconvError(f"{where}'{text}' is not a number", percent_hint(text)) from None
+    if _DECIMAL_COMMA.match(text):
+        hint = f"did you mean {text.strip().replace(',', '.')}?"
+        raise MdfconvError(f"{where}'{text}' is a pair whose first number is 0", hint)
+    if len(parts) > 2:
+        raise MdfconvError(f"{where}'{text}' is not a pair X,Y")
+    return (parts[0], parts[1]) if len(parts) == 2 else parts[0]
+
+
+def _stream(blocks: Iterable[NumberBlock], rule: ConversionRule) -> None:
     """Convert and write block by block, in the memory of one."""
     # A mistake in the names is none of a line.
-    rule.results(NumberBlock([], []), source, target)
+    _results([], rule)
     told: set[str] = set()
     for block in blocks:
         try:
-            lines, cautions = rule.results(block, source, target)
+            lines, cautions = _results(block.numbers, rule)
         except MdfconvError as error:
-            raise _at_its_line(error, block, source, target, rule) from None
-        for caution in dict.fromkeys(cautions):
-            if caution not in told:
-                tell(f"note: {caution}")
-                told.add(caution)
+            raise _at_its_line(error, block, rule) from None
+        _tell_new(cautions, told)
         typer.echo("\n".join(lines))
 
 
-def _at_its_line(
-    error: MdfconvError, block: NumberBlock, source: str, target: str, rule: _ValueRule
-) -> MdfconvError:
+def _results(numbers: list[Value], rule: ConversionRule) -> tuple[list[str], list[str]]:
+    """Return the results of a block as text, and what they call for."""
+    if holds_pairs(numbers):
+        conversions = explained(numbers, rule, errors=False)
+        cautions = [text for conversion in conversions for text in conversion.cautions]
+        return [value_text(conversion.result) for conversion in conversions], cautions
+    converted = rule.convert(np.array(numbers, dtype=float))
+    return list(map(number_text, converted.stored.tolist())), rule.true_cautions(converted)
+
+
+def _at_its_line(error: MdfconvError, block: NumberBlock, rule: ConversionRule) -> MdfconvError:
     """Return the error of the first value that has one, with its line of standard input."""
     if not block.lines:
         return error
@@ -212,25 +246,32 @@ def _at_its_line(
     while high - low > 1:
         middle = (low + high) // 2
         try:
-            rule.results(NumberBlock(block.numbers[low:middle], []), source, target)
+            _results(block.numbers[low:middle], rule)
             low = middle
         except MdfconvError:
             high = middle
     try:
-        rule.results(NumberBlock(block.numbers[low:high], []), source, target)
+        _results(block.numbers[low:high], rule)
     except MdfconvError as alone:
         reason = f"line {block.lines[low]} of standard input: {alone.reason}"
         return MdfconvError(reason, alone.hint)
     return error
 
 
-def _write_plain(conversions: list[list[Conversion]], *, named: bool, free: bool) -> None:
+def _tell_new(cautions: Iterable[str], told: set[str]) -> None:
+    """Tell each caution that has not been told yet."""
+    for caution in cautions:
+        if caution not in told:
+            tell(f"note: {caution}")
+            told.add(caution)
+
+
+def _write_plain(groups: list[list[Conversion]], *, named: bool, free: bool) -> None:
     """Write the bare results, behind their names where there are several targets."""
-    every = [conversion for group in conversions for conversion in group]
-    for caution in dict.fromkeys(text for conversion in every for text in conversion.cautions):
-        tell(f"note: {caution}")
+    conversions = [conversion for group in groups for conversion in group]
+    _tell_new((text for conversion in conversions for text in conversion.cautions), set())
     lines = []
-    for conversion in every:
+    for conversion in conversions:
         words = [conversion.target] if named else []
         words.append(value_text(conversion.result))
         if free and conversion.gamma is not None:
@@ -239,59 +280,77 @@ def _write_plain(conversions: list[list[Conversion]], *, named: bool, free: bool
     typer.echo("\n".join(lines))
 
 
-def _write_tables(conversions: list[list[Conversion]], rule: _ValueRule) -> None:
-    """Write tables a target: the methods under the metric, and the fits under the others."""
+def _print_group(group: list[Conversion], gamma: Gamma, exposure: float | None) -> None:
+    """Print the conversions to a target by every method, and the fits under the other metrics."""
     out = console()
-    for group in conversions:
-        _print_methods(group, rule)
-        for caution in dict.fromkeys(text for conversion in group for text in conversion.cautions):
-            out.print(f"Note: {caution}.")
-        inexact = [conversion for conversion in group if not conversion.exact]
-        if not inexact:
-            out.print("Exact: the same form.")
-            continue
-        metric = metric_named(inexact[0].metric)
-        out.print(
-            f"[dim]Errors under {metric} ({metric.purpose}): root mean square and maximum, "
-            "relative to the source's.[/dim]"
-        )
-        if len(inexact) <= _VALUES_WITH_ALTERNATIVES:
-            _print_metrics(inexact, rule)
-
-
-def _headings(conversion: Conversion) -> list[str]:
-    ends = [endpoint(name) for name in (conversion.source, conversion.target)]
-    second = ends[1].distribution.second_parameter
-    return [f"{end.label} {end.stored.symbol}" for end in ends] + (
-        [second.symbol] if second else []
-    )
-
-
-def _print_methods(group: list[Conversion], rule: _ValueRule) -> None:
     headings = _headings(group[0])
-    rows, styles = [], []
+    rows: list[dict[str, Any]] = []
+    styles: list[str] = []
     for conversion in group[:ROWS_SHOWN]:
         rows.append(_row(conversion, headings))
         styles.append("bold")
         if len(group) <= _VALUES_WITH_ALTERNATIVES and not conversion.exact:
-            others = _answers(conversion, rule.others(conversion))
+            others = _by_other_methods(conversion, gamma)
             rows += [_row(other, headings, first=False) for other in others]
-            styles += ["dim"] * (len(rows) - len(styles))
+            styles += ["dim"] * len(others)
     title = f"{' → '.join(headings[:2])}, {group[0].metric}"
     print_table(list(rows[0]), rows, title, styles, count=len(group))
-
-
-def _print_metrics(group: list[Conversion], rule: _ValueRule) -> None:
-    headings = _headings(group[0])
+    for caution in dict.fromkeys(text for conversion in group for text in conversion.cautions):
+        out.print(f"Note: {caution}.")
+    inexact = [conversion for conversion in group if not conversion.exact]
+    if not inexact:
+        out.print("Exact: the same form.")
+        return
+    metric = metric_named(inexact[0].metric)
+    out.print(
+        f"[dim]Errors under {metric} ({metric.purpose}): root mean square and maximum, "
+        "relative to the source's.[/dim]"
+    )
+    if len(inexact) > _VALUES_WITH_ALTERNATIVES:
+        return
     rows = []
-    for conversion in group:
-        others = _answers(conversion, rule.under_other_metrics(conversion))
-        for number, other in enumerate(others):
+    for conversion in inexact:
+        for number, other in enumerate(_under_other_metrics(conversion, gamma, exposure)):
             metric = metric_named(other.metric)
             row = _row(other, headings, first=number == 0)
             rows.append(row | {"fit under": str(metric), "for": metric.purpose})
-    columns = [*headings, "fit under", "for"]
-    print_table(columns, rows, "Fits under the other metrics")
+    print_table([*headings, "fit under", "for"], rows, "Fits under the other metrics")
+
+
+def _by_other_methods(chosen: Conversion, gamma: Gamma) -> list[Conversion]:
+    """Return the conversions of a value by the other methods that answer."""
+    if gamma == FREE:
+        return []
+    names = [method.name for method in list_methods() if method.name != chosen.method]
+    return _others(chosen, [(name, chosen.metric) for name in names], gamma)
+
+
+def _under_other_metrics(
+    chosen: Conversion, gamma: Gamma, exposure: float | None
+) -> list[Conversion]:
+    """Return the fits of a value under the other metrics."""
+    metrics = [metric for metric in every_metric(exposure) if str(metric) != chosen.metric]
+    return _others(chosen, [(None, metric) for metric in metrics], gamma)
+
+
+def _others(
+    chosen: Conversion, rules: list[tuple[str | None, str | Metric]], gamma: Gamma
+) -> list[Conversion]:
+    """Return what methods and metrics make of a value, but for those that have no answer."""
+    found: list[Conversion] = []
+    for method, metric in rules:
+        with suppress(MdfconvError):
+            found += explain(
+                chosen.value, chosen.source, chosen.target, method, metric=metric, gamma=gamma
+            )
+    return found
+
+
+def _headings(conversion: Conversion) -> list[str]:
+    ends = [endpoint(name) for name in (conversion.source, conversion.target)]
+    headings = [f"{end.label} {end.stored.symbol}" for end in ends]
+    second = ends[1].distribution.second_parameter
+    return [*headings, second.symbol] if second else headings
 
 
 def _row(conversion: Conversion, headings: list[str], *, first: bool = True) -> dict[str, Any]:
@@ -303,25 +362,7 @@ def _row(conversion: Conversion, headings: list[str], *, first: bool = True) -> 
     }
 
 
-def _answers(conversion: Conversion, rules: Iterator[_ValueRule]) -> Iterator[Conversion]:
-    """Yield what other rules make of a value; nothing for one that has no answer."""
-    for rule in rules:
-        with suppress(MdfconvError):
-            yield from rule.explain(
-                conversion.value, conversion.source, conversion.target, errors=True
-            )
-
-
 def _record(conversion: Conversion) -> dict[str, Any]:
-    return {
-        "from": conversion.source,
-        "to": conversion.target,
-        "value": conversion.value,
-        "result": conversion.result,
-        "gamma": conversion.gamma,
-        "method": conversion.method,
-        "metric": conversion.metric,
-        "rmse": conversion.rmse,
-        "max_error": conversion.max_error,
-        "notes": conversion.notes,
-    }
+    names = "value", "result", "gamma", "method", "metric", "rmse", "max_error", "notes"
+    ends = {"from": conversion.source, "to": conversion.target}
+    return ends | {name: getattr(conversion, name) for name in names}

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.names import in_asked_forms, noted
 from mdfconv.cli.options import (
     ForceOption,
     Format,
@@ -23,6 +22,8 @@ from mdfconv.cli.options import (
     OutputOption,
     PngOption,
     chosen_gamma,
+    in_asked_forms,
+    noted,
 )
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.process import tell

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.names import noted
 from mdfconv.cli.options import (
     ExposureOption,
     FixedGammaOption,
@@ -18,6 +17,7 @@ from mdfconv.cli.options import (
     ToOption,
     chosen_metric,
     fixed_gamma,
+    noted,
     refuse_given,
 )
 from mdfconv.cli.tables import write_table

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mdfconv.cli import completion
 from mdfconv.cli.material_files import (
     InPlaceOption,
+    MaterialReport,
     ReportFormat,
     ReportFormatOption,
     ResultOption,
     about,
     convert_files,
-    material_rows,
-    print_importers,
-    print_materials,
 )
 from mdfconv.cli.options import (
     ExposureOption,
@@ -29,13 +26,11 @@ from mdfconv.cli.options import (
 )
 from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
-from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from mdfconv.distributions.endpoint import Endpoint
-    from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.gltf.asset import GltfConversion
     from mdfconv.scene.material_files import Destination
 
@@ -43,6 +38,9 @@ _HEADINGS = {
     "index": "#", "name": "material", "value": "was", "result": "is", "rmse": "RMSE",
     "notes": "notes",
 }  # fmt: skip
+_KEYS = (
+    "file", "output", "from", "to", "metric", "count", "materials", "textures", "problems",
+)  # fmt: skip
 
 
 def command(
@@ -116,10 +114,16 @@ def command(
 
     mdfconv gltf lamp.gltf -o new.gltf --from blinn-phong:assimp-gltf --specular 0.5 --compare
     """
+    from mdfconv.distributions.endpoint import with_specular
+    from mdfconv.scene.gltf.asset import convert_gltf, factor_endpoints
+    from mdfconv.scene.gltf.images import GltfTextures
+    from mdfconv.scene.shininess import ROUGHNESS, SHININESS
+    from mdfconv.scene.stored import ProblemKind
+
     if guess:
-        given = [option.name for option in context.command.params if option.name]
-        ignored = set(given) - {"files", "guess"}
-        refuse_given(context, ignored, "does not go with --guess, which only proposes --from")
+        others = {option.name for option in context.command.params if option.name}
+        others -= {"files", "guess"}
+        refuse_given(context, others, "does not go with --guess, which only proposes --from")
         _propose(files)
         return
     if not textures:
@@ -129,76 +133,43 @@ def command(
             "the rule by which the factors were stored is missing: give --from",
             "--guess proposes one",
         )
-    _convert(
-        context,
-        files,
-        output,
-        source,
-        target,
-        chosen_metric(metric, exposure),
-        specular=specular,
-        in_place=in_place,
-        force=force,
-        textures=textures,
-        lossy=lossy,
-        compare=compare,
-        form=format_,
-    )
-
-
-def _convert(
-    context: typer.Context,
-    files: list[str],
-    output: str | None,
-    source: str,
-    target: str | None,
-    metric: Metric,
-    *,
-    specular: float | None,
-    in_place: bool,
-    force: bool,
-    textures: bool,
-    lossy: bool,
-    compare: bool,
-    form: ReportFormat,
-) -> None:
-    from mdfconv.distributions.endpoint import with_specular
-    from mdfconv.scene.gltf.asset import convert_gltf
-    from mdfconv.scene.gltf.factors import factor_endpoints
-    from mdfconv.scene.gltf.images import GltfTextures
-    from mdfconv.scene.shininess import ROUGHNESS, SHININESS
-
+    chosen = chosen_metric(metric, exposure)
     names = with_specular(source, target or ROUGHNESS, specular)
     # A mistake in the names is none of a file.
-    ends = factor_endpoints(*names)
-    if compare and ends[0].distribution.name != SHININESS:
-        raise MdfconvError(f"--compare is about exponents, {ends[0].label} stores none")
+    pair = factor_endpoints(*names)
+    if compare and pair[0].distribution.name != SHININESS:
+        raise MdfconvError(f"--compare is about exponents, {pair[0].label} stores none")
 
     def convert(destination: Destination, data: bytes) -> GltfConversion:
         _check_form(destination, data)
         folders = GltfTextures(destination.source.parent, destination.output.parent, lossy)
-        chosen = folders if textures else None
         with about(destination.source):
-            conversion = convert_gltf(data, *ends, metric=metric, textures=chosen)
-        _tell_other_generator(destination.source, conversion.generator, ends[0])
-        problems = [(place, _with_option(text)) for place, text in conversion.problems]
-        return dataclasses.replace(conversion, problems=tuple(problems))
+            conversion = convert_gltf(
+                data, *pair, metric=chosen, textures=folders if textures else None
+            )
+        _tell_other_generator(destination.source, conversion.generator, pair[0])
+        return conversion
 
-    convert_files(
-        context,
-        files,
-        output,
-        in_place=in_place,
-        force=force,
-        metric=metric,
-        convert=convert,
-        report=lambda converted: _report(converted, metric, names, form=form, compare=compare),
+    report = MaterialReport(
+        form=format_,
+        metric=chosen,
+        keys=_KEYS,
+        details=lambda conversion: {
+            "from": names[0],
+            "to": names[1],
+            "textures": list(map(str, conversion.files)),
+        },
+        headings=_HEADINGS,
+        place="place",
+        remedies={ProblemKind.TEXTURE: ": --textures converts it", ProblemKind.LOSSY: " (--lossy)"},
+        exponent="parameter" if compare else "",
     )
+    convert_files(context, files, output, convert, report, in_place=in_place, force=force)
 
 
 def _check_form(destination: Destination, data: bytes) -> None:
     """Refuse a name that says of a file that it is of the other form, which it does not become."""
-    from mdfconv.scene.gltf.container import is_glb
+    from mdfconv.scene.gltf.document import is_glb
 
     form = ".glb" if is_glb(data) else ".gltf"
     named = destination.output.suffix.lower()
@@ -234,16 +205,6 @@ def _proposals(generator: str) -> dict[str, str]:
     return proposals
 
 
-def _with_option(problem: str) -> str:
-    """Return what is wrong with a material, with the option that helps."""
-    from mdfconv.scene.gltf.asset import HAS_TEXTURE
-    from mdfconv.scene.texture.images import ACCEPT_LOSSES
-
-    if problem == HAS_TEXTURE:
-        return f"{problem}: --textures converts it"
-    return f"{problem} (--lossy)" if problem.endswith(ACCEPT_LOSSES) else problem
-
-
 def _propose(files: list[str]) -> None:
     """Print which source each file's generator lets expect."""
     from mdfconv.output.files import find_files
@@ -258,38 +219,3 @@ def _propose(files: list[str]) -> None:
         said = f"asset.generator is '{generator}'" if generator else "no asset.generator"
         lines.append(f"{path}: {said}: {' or '.join(proposals) or 'unknown'}")
     typer.echo("\n".join(lines))
-
-
-def _report(
-    converted: list[tuple[Destination, GltfConversion]],
-    metric: Metric,
-    names: tuple[str, str],
-    *,
-    form: ReportFormat,
-    compare: bool,
-) -> None:
-    every = form is ReportFormat.json
-    known = [[material.parameter for material in each.materials] for _, each in converted]
-    records: list[dict[str, Any]] = [
-        {
-            "file": str(destination.source),
-            "output": str(destination.output),
-            "from": names[0],
-            "to": names[1],
-            "metric": str(metric),
-            "count": len(conversion.materials),
-            "materials": material_rows(
-                conversion.materials, exponents, metric, every=every, compare=compare
-            ),
-            "textures": [str(path) for path in conversion.files],
-            "problems": [{"place": place, "problem": text} for place, text in conversion.problems],
-        }
-        for (destination, conversion), exponents in zip(converted, known, strict=True)
-    ]
-    if every:
-        typer.echo(json_text(records))
-        return
-    for record, exponents in zip(records, known, strict=True):
-        print_materials(record, _HEADINGS, record["count"])
-        if compare:
-            print_importers(record, exponents)

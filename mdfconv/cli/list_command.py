@@ -16,8 +16,7 @@ from mdfconv.cli.options import (
 )
 from mdfconv.cli.tables import console, form_of, print_table, write_table
 from mdfconv.distributions import Distribution, list_distributions
-from mdfconv.distributions.dialects import dialects_of
-from mdfconv.distributions.parameter import Parameter
+from mdfconv.distributions.endpoint import forms_of
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 
@@ -61,17 +60,17 @@ def command(
     if metric is not None or exposure is not None:
         raise MdfconvError("--metric is of --encodings")
     form = form_of(format_, in_pipe=Format.plain)
-    records = [_record(mdf) for mdf in list_distributions()]
     if form is Format.table:
-        _print_table(records)
+        rows = [_row(mdf) for mdf in list_distributions()]
+        print_table(list(rows[0]), rows)
     else:
-        columns = ["name"] if form is Format.plain else list(records[0])
-        write_table(columns, records, form)
+        records = [_record(mdf) for mdf in list_distributions()]
+        write_table(["name"] if form is Format.plain else list(records[0]), records, form)
 
 
 def _list_encodings(metric: Metric, format_: Format | None) -> None:
     """Print the table of encodings and dialects."""
-    from mdfconv.scene.encodings import EXPONENTS, encoding_records
+    from mdfconv.scene.shininess import EXPONENTS, encoding_records
 
     form = form_of(format_)
     records = encoding_records(metric)
@@ -99,45 +98,41 @@ def _error(rmse: float | None) -> float | str | None:
     return "mirror" if math.isinf(rmse) else float(f"{rmse:.2g}")
 
 
+def _row(mdf: Distribution) -> dict[str, str]:
+    parameters = [
+        f"{parameter.name}: {parameter.legal}, typically {low:g} to {high:g}"
+        for parameter in mdf.parameters
+        for low, high in [parameter.typical]
+    ]
+    if mdf.anisotropic:
+        parameters.append("or a pair X,Y")
+    return {
+        "name": mdf.name,
+        "parameter": "; ".join(parameters),
+        "aliases": ", ".join(mdf.aliases),
+        "unit form D̄": mdf.unit_formula,
+        "source": mdf.source,
+        "encodings": ", ".join(_formulas(mdf)),
+    }
+
+
 def _record(mdf: Distribution) -> dict[str, Any]:
+    columns = "name", "symbol", "legal", "typical", "larger_is_smoother"
     return {
         "name": mdf.name,
         "aliases": mdf.aliases,
         "anisotropic": mdf.anisotropic,
-        "parameters": [_parameter(parameter) for parameter in mdf.parameters],
-        "encodings": {encoding.name: encoding.formula for encoding in mdf.encodings}
-        | {name: dialect.formula for name, dialect in dialects_of(mdf.name).items()},
+        "parameters": [
+            {column: getattr(parameter, column) for column in columns}
+            for parameter in mdf.parameters
+        ],
+        "encodings": _formulas(mdf),
         "unit_form": mdf.unit_formula,
         "normalized_form": mdf.normalized_formula,
         "source": mdf.source,
     }
 
 
-def _parameter(parameter: Parameter) -> dict[str, Any]:
-    return {
-        "name": parameter.name,
-        "symbol": parameter.symbol,
-        "legal": parameter.legal,
-        "typical": list(parameter.typical),
-        "larger_is_smoother": parameter.larger_is_smoother,
-    }
-
-
-def _print_table(records: list[dict[str, Any]]) -> None:
-    rows = [
-        {
-            "name": record["name"],
-            "parameter": "; ".join(
-                f"{parameter['name']}: {parameter['legal']}, typically "
-                f"{parameter['typical'][0]:g} to {parameter['typical'][1]:g}"
-                for parameter in record["parameters"]
-            )
-            + "; or a pair X,Y" * record["anisotropic"],
-            "aliases": ", ".join(record["aliases"]),
-            "unit form D̄": record["unit_form"],
-            "source": record["source"],
-            "encodings": ", ".join(record["encodings"]),
-        }
-        for record in records
-    ]
-    print_table(list(rows[0]), rows)
+def _formulas(mdf: Distribution) -> dict[str, str]:
+    """Return the formulas of the forms in which the parameter is stored, by their names."""
+    return {name: form.formula for name, form in forms_of(mdf).items()}

@@ -1,4 +1,4 @@
-"""What the commands that convert files of materials share."""
+"""What the commands that convert files of materials share: all but what a material is."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import ROWS_SHOWN, print_table
 from mdfconv.errors import MdfconvError
+from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
     from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.material_files import Destination, FileConversion
+    from mdfconv.scene.stored import MaterialProblem, ProblemKind
 
-    Conversion = TypeVar("Conversion", bound=FileConversion)
-else:
-    Conversion = TypeVar("Conversion")
-
+Rows = list[dict[str, Any]]
 
 # Two milliseconds a row: of a hundred thousand materials the report is not to take the time.
 MATERIALS_SHOWN = 100
@@ -57,16 +57,157 @@ ReportFormatOption = Annotated[
 ]
 
 
+@dataclass(frozen=True, kw_only=True)
+class MaterialReport:
+    """How a command reports what it converted.
+
+    Parameters
+    ----------
+    form : ReportFormat
+        A table, or JSON.
+    metric : Metric
+        What the conversions keep.
+    keys : sequence of str
+        What JSON has of a file, in order: of ``file``, ``output``, ``metric``, ``count``,
+        ``materials``, ``problems``, ``notes``, and of the details.
+    details : callable
+        From a conversion to what only this command has of it, by key.
+    headings : mapping of str to str
+        The fields of a material that the table shows, where there are such, and their headings.
+    secondary : sequence of str
+        As for `print_table`.
+    place : str
+        What JSON calls the place of a problem.
+    remedies : mapping of ProblemKind to str
+        The options that help, to stand behind the text of a problem.
+    exponent : str
+        The field of a material that is an exponent of Blinn/Phong, if what importers make of it
+        is to be shown.
+    compare : callable, optional
+        Adds other comparisons to the rows of materials.
+    print_more : callable, optional
+        Prints what else there is to say of a file, below its table.
+    """
+
+    form: ReportFormat
+    metric: Metric
+    keys: Sequence[str]
+    details: Callable[[Any], dict[str, Any]]
+    headings: Mapping[str, str]
+    secondary: Sequence[str] = ()
+    place: str = "line"
+    remedies: Mapping[ProblemKind, str] = field(default_factory=dict)
+    exponent: str = ""
+    compare: Callable[[Sequence[Any], Rows], None] | None = None
+    print_more: Callable[[dict[str, Any]], None] | None = None
+
+    def print(self, converted: Sequence[tuple[Destination, FileConversion]]) -> None:
+        """Print JSON of all to standard output, or tables to standard error."""
+        if self.form is ReportFormat.json:
+            typer.echo(json_text([self._record(*file) for file in converted]))
+            return
+        for destination, conversion in converted:
+            self._print_tables(self._record(destination, conversion), conversion)
+
+    def problem_text(self, problem: MaterialProblem) -> str:
+        """Return what is wrong, with the option that helps."""
+        return problem.text + self.remedies.get(problem.kind, "")
+
+    def _record(self, destination: Destination, conversion: FileConversion) -> dict[str, Any]:
+        """Return what is said of a file: of all materials, or of those that a table shows."""
+        shown = conversion.materials
+        if self.form is ReportFormat.table:
+            shown = shown[:MATERIALS_SHOWN]
+        rows = [vars(material) | {"notes": list(material.notes)} for material in shown]
+        if self.compare:
+            self.compare(shown, rows)
+        if self.exponent:
+            self._add_importers(rows)
+        known = {
+            "file": str(destination.source),
+            "output": str(destination.output),
+            "metric": str(self.metric),
+            "count": len(conversion.materials),
+            "materials": rows,
+            "problems": [
+                {self.place: problem.place, "problem": self.problem_text(problem)}
+                for problem in conversion.problems
+            ],
+            "notes": [{"line": line, "note": text} for line, text in conversion.notes],
+        } | self.details(conversion)
+        return {key: known[key] for key in self.keys}
+
+    def _add_importers(self, rows: Rows) -> None:
+        """Add what importers make of the exponents, to all rows or to those that are shown."""
+        import numpy as np
+
+        from mdfconv.scene.shininess import IMPORTERS, importer_results
+
+        for row in rows:
+            row["importers"] = {}
+        known = [row for row in rows if math.isfinite(row[self.exponent])]
+        if self.form is ReportFormat.table:
+            known = known[: ROWS_SHOWN // len(IMPORTERS)]
+        exponents = np.array([row[self.exponent] for row in known])
+        for row, results in zip(known, importer_results(exponents, self.metric), strict=True):
+            row["importers"] = {
+                result.importer: {"roughness": result.roughness, "rmse": result.rmse}
+                for result in results
+            }
+
+    def _print_tables(self, record: dict[str, Any], conversion: FileConversion) -> None:
+        rows = record["materials"]
+        if rows:
+            headings = {key: text for key, text in self.headings.items() if key in rows[0]}
+            cells = [{text: row[key] for key, text in headings.items()} for row in rows]
+            title = f"{record['file']}, {self.metric} metric"
+            self._print_table(cells, title, len(conversion.materials))
+        else:
+            typer.echo(f"{record['file']}: nothing to convert", err=True)
+        if self.exponent:
+            self._print_importers(rows, conversion)
+        if self.print_more:
+            self.print_more(record)
+
+    def _print_importers(self, rows: Rows, conversion: FileConversion) -> None:
+        from mdfconv.scene.shininess import IMPORTERS
+
+        cells = [
+            {
+                "material": row["name"],
+                "importer": name,
+                "roughness": result["roughness"],
+                "RMSE": "a mirror" if math.isinf(result["rmse"]) else result["rmse"],
+            }
+            for row in rows
+            for name, result in row["importers"].items()
+        ]
+        if cells:
+            exponents = [getattr(each, self.exponent) for each in conversion.materials]
+            count = len(IMPORTERS) * sum(map(math.isfinite, exponents))
+            self._print_table(cells, "Importers", count)
+
+    def _print_table(self, rows: Rows, title: str, count: int) -> None:
+        print_table(
+            list(rows[0]),
+            rows,
+            title,
+            secondary=self.secondary,
+            err=True,
+            everything=_JSON,
+            count=count,
+        )
+
+
 def convert_files(
     context: typer.Context,
     patterns: Sequence[str],
     output: str | None,
+    convert: Callable[[Destination, bytes], FileConversion],
+    report: MaterialReport,
     *,
     in_place: bool,
     force: bool,
-    metric: Metric,
-    convert: Callable[[Destination, bytes], Conversion],
-    report: Callable[[list[tuple[Destination, Conversion]]], None],
 ) -> None:
     """Convert files, write all or none, report, and exit with 1 if something had to be left.
 
@@ -78,16 +219,14 @@ def convert_files(
         Names and glob patterns.
     output : str or None
         A file, or a folder; None in place.
+    convert : callable
+        From where a file goes, and its bytes, to its conversion.
+    report : MaterialReport
+        How what was converted is reported.
     in_place : bool
         Whether the files themselves change.
     force : bool
         Whether files that exist are replaced.
-    metric : Metric
-        What the conversions keep.
-    convert : callable
-        From where a file goes, and its bytes, to its conversion.
-    report : callable
-        Prints what was converted.
 
     Raises
     ------
@@ -105,7 +244,8 @@ def convert_files(
     if output and material_files.is_folder(output):
         new_folder(context, Path(output))
     results = [[] if each.backup else [each.output] for each in destinations]
-    Outputs(*chain(*results), force=force, inputs=[*files, *metric.inputs])
+    inputs = *files, *report.metric.inputs
+    Outputs(*chain(*results), force=force, inputs=inputs)
     converted = []
     for destination, result in zip(destinations, results, strict=True):
         data = material_files.read_file(destination.source)
@@ -113,12 +253,10 @@ def convert_files(
         if conversion.files and is_stream(destination.output):
             raise MdfconvError(f"no texture can stand beside {destination.output}: it is no file")
         # Which textures there are is known only now.
-        inputs = *files, *metric.inputs, *conversion.inputs
-        Outputs(*result, *conversion.files, force=force, inputs=inputs)
+        Outputs(*result, *conversion.files, force=force, inputs=(*inputs, *conversion.inputs))
         converted.append((destination, data, conversion))
     written = material_files.write_conversions(converted, force=force)
-    report([(destination, conversion) for destination, _, conversion in converted])
-    problems = False
+    report.print([(destination, conversion) for destination, _, conversion in converted])
     for destination, _, conversion in converted:
         if destination in written:
             beside = [path for path in (destination.backup, *conversion.files) if path]
@@ -128,10 +266,10 @@ def convert_files(
         else:
             tell(f"nothing to change in {destination.output}")
         _tell_notes(destination.source, conversion.notes)
-        for place, text in conversion.problems:
-            tell(f"{destination.source}:{place}: {text}: left as it is")
-            problems = True
-    if problems:
+        for problem in conversion.problems:
+            text = report.problem_text(problem)
+            tell(f"{destination.source}:{problem.place}: {text}: left as it is")
+    if any(conversion.problems for *_, conversion in converted):
         raise typer.Exit(1)
 
 
@@ -167,101 +305,3 @@ def about(path: Path) -> Iterator[None]:
         yield
     except MdfconvError as error:
         raise MdfconvError(f"{path}: {error.reason}", error.hint, argument=error.argument) from None
-
-
-def print_materials(
-    record: Mapping[str, Any],
-    headings: Mapping[str, str],
-    count: int,
-    secondary: Sequence[str] = (),
-) -> None:
-    """Print a table of what was converted to standard error.
-
-    Parameters
-    ----------
-    record : mapping
-        What is said of a file: ``file``, ``metric`` and rows of ``materials``.
-    headings : mapping
-        The keys of the rows that are shown, and their headings.
-    count : int
-        How many materials there are.
-    secondary : sequence of str
-        As for `write_table`.
-    """
-    rows = [{heading: row[key] for key, heading in headings.items()} for row in record["materials"]]
-    title = f"{record['file']}, {record['metric']} metric"
-    if rows:
-        columns = list(headings.values())
-        print_table(
-            columns, rows, title, secondary=secondary, err=True, everything=_JSON, count=count
-        )
-    else:
-        typer.echo(f"{record['file']}: nothing to convert", err=True)
-
-
-def material_rows(
-    materials: Sequence[Any],
-    exponents: Sequence[float],
-    metric: Metric,
-    *,
-    every: bool,
-    compare: bool,
-) -> list[dict[str, Any]]:
-    """Return rows for materials, every one or those that a table shows.
-
-    Parameters
-    ----------
-    materials : sequence
-        What was converted: with `notes`, and more for the rows.
-    exponents : sequence of float
-        Those of the materials; NaN where there is none.
-    metric : Metric
-        Under which importers are compared.
-    every : bool
-        Whether all are wanted.
-    compare : bool
-        Whether the rows say what importers make of the exponents.
-    """
-    most = None if every else MATERIALS_SHOWN
-    rows = [vars(material) | {"notes": list(material.notes)} for material in materials[:most]]
-    if compare:
-        _add_importers(rows, exponents[:most], metric, every=every)
-    return rows
-
-
-def _add_importers(
-    rows: list[dict[str, Any]], exponents: Sequence[float], metric: Metric, *, every: bool
-) -> None:
-    """Add to rows of materials what importers make of their exponents, to all or those shown."""
-    import numpy as np
-
-    from mdfconv.scene.shininess import IMPORTERS, importer_results
-
-    most = None if every else ROWS_SHOWN // len(IMPORTERS)
-    known = [number for number, exponent in enumerate(exponents) if math.isfinite(exponent)][:most]
-    results = importer_results(np.array([exponents[number] for number in known]), metric)
-    for row in rows:
-        row["importers"] = {}
-    for number, result in zip(known, results, strict=True):
-        rows[number]["importers"] = {
-            r.importer: {"roughness": r.roughness, "rmse": r.rmse} for r in result
-        }
-
-
-def print_importers(record: Mapping[str, Any], exponents: Sequence[float]) -> None:
-    """Print what importers make of the exponents of a file to standard error."""
-    from mdfconv.scene.shininess import IMPORTERS
-
-    rows = [
-        {
-            "material": row["name"],
-            "importer": name,
-            "roughness": result["roughness"],
-            "RMSE": "a mirror" if math.isinf(result["rmse"]) else result["rmse"],
-        }
-        for row in record["materials"]
-        for name, result in row["importers"].items()
-    ]
-    if rows:
-        count = len(IMPORTERS) * sum(map(math.isfinite, exponents))
-        print_table(list(rows[0]), rows, "Importers", err=True, everything=_JSON, count=count)

@@ -9,30 +9,31 @@ import typer
 
 from mdfconv.cli import completion
 from mdfconv.cli.material_files import (
-    MATERIALS_SHOWN,
     InPlaceOption,
+    MaterialReport,
     ReportFormat,
     ReportFormatOption,
     ResultOption,
+    Rows,
     about,
     convert_files,
-    print_materials,
 )
 from mdfconv.cli.options import ExposureOption, ForceOption, MetricOption, chosen_metric
 from mdfconv.cli.process import tell
-from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
-    from mdfconv.fitting.metrics import Metric
+    from collections.abc import Sequence
+
     from mdfconv.scene.material_files import Destination
-    from mdfconv.scene.mitsuba.convert import MitsubaConversion
+    from mdfconv.scene.mitsuba.convert import MitsubaConversion, MitsubaMaterial
 
 _HEADINGS = {
     "name": "BSDF", "line": "line", "distribution": "from", "value": "α", "result": "new α",
     "rmse": "RMSE", "rmse_unchanged": "kept", "notes": "notes",
 }  # fmt: skip
-# With --compare 80 columns are too few for all.
-_SECONDARY = ("from", "line")
+_KEYS = (
+    "file", "output", "target", "metric", "materials", "textures", "includes", "problems",
+)  # fmt: skip
 
 
 def command(
@@ -78,77 +79,55 @@ def command(
 
     mdfconv mitsuba scene.xml -o out --textures --compare --format json
     """
-    from mdfconv.scene.mitsuba.convert import check_target, convert_mitsuba
-    from mdfconv.scene.mitsuba.textures import BitmapConverter
+    from mdfconv.scene.material_files import TextureFolder
+    from mdfconv.scene.mitsuba.convert import check_target, convert_mitsuba, unchanged_errors
+    from mdfconv.scene.texture.rule import TextureRule
 
-    wanted = check_target(to)
-    kept = chosen_metric(metric, exposure)
+    target = check_target(to)
+    chosen = chosen_metric(metric, exposure)
 
     def convert(destination: Destination, data: bytes) -> MitsubaConversion:
-        paths = destination.source, destination.output
-        bitmaps = BitmapConverter(*paths, wanted, kept) if textures else None
+        folder = TextureFolder(destination.source, destination.output)
+
+        def texture(file: str, distribution: str) -> str:
+            return folder.convert(
+                file, TextureRule(distribution, target, metric=str(chosen)), target
+            )
+
         with about(destination.source):
-            conversion = convert_mitsuba(data, wanted, metric=kept, texture=bitmaps)
-        if bitmaps is None:
-            return conversion
-        files = bitmaps.files({texture.result for texture in conversion.textures})
-        return dataclasses.replace(conversion, files=files, inputs=bitmaps.inputs)
+            conversion = convert_mitsuba(
+                data, target, metric=chosen, texture=texture if textures else None
+            )
+        # A texture whose BSDF is left for another reason is not written.
+        names = {texture.result for texture in conversion.textures}
+        files = {path: data for path, data in folder.files.items() if path.name in names}
+        return dataclasses.replace(conversion, files=files, inputs=folder.inputs)
 
-    def report(converted: list[tuple[Destination, MitsubaConversion]]) -> None:
-        if format_ is ReportFormat.json:
-            records = [_record(*each, wanted, kept, compare=compare) for each in converted]
-            typer.echo(json_text(records))
-            return
-        for each in converted:
-            record = _record(*each, wanted, kept, compare=compare, most=MATERIALS_SHOWN)
-            _print_report(record, len(each[1].materials))
-
-    convert_files(
-        context,
-        scenes,
-        output,
-        in_place=in_place,
-        force=force,
-        metric=kept,
-        convert=convert,
-        report=report,
-    )
-
-
-def _record(
-    destination: Destination,
-    conversion: MitsubaConversion,
-    target: str,
-    metric: Metric,
-    *,
-    compare: bool,
-    most: int | None = None,
-) -> dict[str, Any]:
-    """Return what is said of a scene, of its first materials if there is a limit."""
-    materials = [vars(each) | {"notes": list(each.notes)} for each in conversion.materials[:most]]
-    if compare:
-        from mdfconv.scene.mitsuba.convert import unchanged_errors
-
-        errors = unchanged_errors(conversion.materials[:most], target, metric)
-        for row, error in zip(materials, errors, strict=True):
+    def add_unchanged_errors(materials: Sequence[MitsubaMaterial], rows: Rows) -> None:
+        errors = unchanged_errors(materials, target, chosen)
+        for row, error in zip(rows, errors, strict=True):
             row["rmse_unchanged"] = error
-    return {
-        "file": str(destination.source),
-        "output": str(destination.output),
-        "target": target,
-        "metric": str(metric),
-        "materials": materials,
-        "textures": [vars(texture) for texture in conversion.textures],
-        "includes": [{"line": line, "file": file} for line, file in conversion.includes],
-        "problems": [{"line": line, "problem": text} for line, text in conversion.problems],
-    }
+
+    report = MaterialReport(
+        form=format_,
+        metric=chosen,
+        keys=_KEYS,
+        details=lambda conversion: {
+            "target": target,
+            "textures": list(map(vars, conversion.textures)),
+            "includes": [{"line": line, "file": file} for line, file in conversion.includes],
+        },
+        headings=_HEADINGS,
+        # With --compare 80 columns are too few for all.
+        secondary=("from", "line"),
+        compare=add_unchanged_errors if compare else None,
+        print_more=_print_more,
+    )
+    convert_files(context, scenes, output, convert, report, in_place=in_place, force=force)
 
 
-def _print_report(record: dict[str, Any], count: int) -> None:
-    """Print what was converted to standard error."""
-    shown = record["materials"][:1]
-    headings = {key: text for key, text in _HEADINGS.items() if shown and key in shown[0]}
-    print_materials(record, headings, count, _SECONDARY)
+def _print_more(record: dict[str, Any]) -> None:
+    """Print what became of textures, and what was not read."""
     for texture in record["textures"]:
         typer.echo(
             f"{texture['file']} became {texture['result']} (line {texture['line']})", err=True

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mdfconv.cli import completion
 from mdfconv.cli.material_files import (
     InPlaceOption,
+    MaterialReport,
     ReportFormat,
     ReportFormatOption,
     ResultOption,
     about,
     convert_files,
-    material_rows,
-    print_importers,
-    print_materials,
 )
 from mdfconv.cli.options import (
     ExposureOption,
@@ -29,13 +26,11 @@ from mdfconv.cli.options import (
 )
 from mdfconv.cli.tables import progress
 from mdfconv.errors import MdfconvError
-from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
-    from mdfconv.fitting.metrics import Metric
     from mdfconv.scene.material_files import Destination
     from mdfconv.scene.mtl.library import MtlConversion
-    from mdfconv.scene.mtl.textures import MtlTextures
+    from mdfconv.scene.stored import MaterialProblem
 
 _HEADINGS = {
     "name": "material", "shininess": "Ns", "roughness": "Pr", "rmse": "RMSE", "notes": "notes",
@@ -98,89 +93,41 @@ def command(
 
     mdfconv mtl --to shininess chair-pbr.mtl -o chair-phong.mtl
     """
-    from mdfconv.scene.mtl.library import convert_mtl
+    from mdfconv.scene.material_files import TextureFolder
+    from mdfconv.scene.mtl.library import convert_library_textures, convert_mtl, texture_rule
+    from mdfconv.scene.stored import ProblemKind
 
-    wanted = to.strip().lower()
-    if wanted != "roughness" and (compare or textures):
+    to = to.strip().lower()
+    if to != "roughness" and (compare or textures):
         raise MdfconvError("--compare and --textures go with --to roughness")
     if not textures:
         refuse_given(context, ["exponent_max"], "goes with --textures")
-    kept = chosen_metric(metric, exposure)
+    chosen = chosen_metric(metric, exposure)
+    # A mistake in it is none of a library.
+    rule = texture_rule(chosen, exponent_max)
 
     def convert(destination: Destination, data: bytes) -> MtlConversion:
-        new = _convert_textures(destination, data, kept, exponent_max) if textures else None
-        names = new.names if new else None
+        folder = TextureFolder(destination.source, destination.output)
+        names: dict[str, str] | None = None
+        problems: list[MaterialProblem] = []
+        if textures:
+            names, problems = convert_library_textures(data, folder, rule, progress)
         with about(destination.source):
-            conversion = convert_mtl(
-                data, wanted, metric=kept, replace=replace, texture_names=names
-            )
-        if new is None:
-            return dataclasses.replace(conversion, problems=_with_option(conversion.problems))
-        problems = (*new.problems, *conversion.problems)
+            conversion = convert_mtl(data, to, metric=chosen, replace=replace, texture_names=names)
         return dataclasses.replace(
-            conversion, files=new.files, inputs=new.inputs, problems=problems
+            conversion,
+            files=folder.files,
+            inputs=folder.inputs,
+            problems=(*problems, *conversion.problems),
         )
 
-    convert_files(
-        context,
-        libraries,
-        output,
-        in_place=in_place,
-        force=force,
-        metric=kept,
-        convert=convert,
-        report=lambda converted: _report(converted, kept, form=format_, compare=compare),
+    report = MaterialReport(
+        form=format_,
+        metric=chosen,
+        keys=["file", "output", "metric", "materials", "textures", "problems", "notes"],
+        details=lambda conversion: {"textures": list(map(vars, conversion.textures))},
+        headings=_HEADINGS,
+        remedies={ProblemKind.TEXTURE: ": --textures converts it"},
+        exponent="shininess" if compare else "",
     )
-
-
-def _with_option(problems: Sequence[tuple[int | str, str]]) -> tuple[tuple[int | str, str], ...]:
-    """Return what is left in a library, with the option that helps."""
-    return tuple(
-        (line, f"{text}: --textures converts it" if text.startswith("map_Ns") else text)
-        for line, text in problems
-    )
-
-
-def _convert_textures(
-    destination: Destination, data: bytes, metric: Metric, exponent_max: float
-) -> MtlTextures:
-    """Convert the textures of a library."""
-    from mdfconv.scene.mtl.library import texture_statements
-    from mdfconv.scene.mtl.textures import convert_textures
-
-    textures = texture_statements(data)
-    paths = destination.source, destination.output
-    with progress("Textures", len(textures)) as advance:
-        return convert_textures(textures, *paths, metric, exponent_max, advance)
-
-
-def _report(
-    converted: list[tuple[Destination, MtlConversion]],
-    metric: Metric,
-    *,
-    form: ReportFormat,
-    compare: bool,
-) -> None:
-    every = form is ReportFormat.json
-    known = [[material.shininess for material in each.materials] for _, each in converted]
-    records: list[dict[str, Any]] = [
-        {
-            "file": str(destination.source),
-            "output": str(destination.output),
-            "metric": str(metric),
-            "materials": material_rows(
-                conversion.materials, exponents, metric, every=every, compare=compare
-            ),
-            "textures": [vars(texture) for texture in conversion.textures],
-            "problems": [{"line": line, "problem": text} for line, text in conversion.problems],
-            "notes": [{"line": line, "note": text} for line, text in conversion.notes],
-        }
-        for (destination, conversion), exponents in zip(converted, known, strict=True)
-    ]
-    if every:
-        typer.echo(json_text(records))
-        return
-    for record, exponents in zip(records, known, strict=True):
-        print_materials(record, _HEADINGS, len(exponents))
-        if compare:
-            print_importers(record, exponents)
+    convert_files(context, libraries, output, convert, report, in_place=in_place, force=force)

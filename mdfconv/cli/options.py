@@ -1,20 +1,23 @@
-"""The options that commands share, each with one wording."""
+"""The options that commands share, each with one wording, and what they stand for."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mdfconv.cli import completion
+from mdfconv.cli.process import tell
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
-    from mdfconv.conversion.arrays import Gamma
+    from mdfconv.conversion.values import Gamma
+    from mdfconv.distributions.endpoint import Endpoint
     from mdfconv.fitting.metrics import Metric
 
 # Of a page a hundred million pixels, a third of a gigabyte.
@@ -190,7 +193,7 @@ def fixed_gamma(text: str | None) -> float | None:
 
 def chosen_gamma(text: str | None) -> Gamma:
     """Return what ``--gamma`` says: None, a number or ``"free"``."""
-    from mdfconv.conversion.arrays import FREE
+    from mdfconv.conversion.values import FREE
 
     if text is None:
         return None
@@ -201,3 +204,42 @@ def chosen_gamma(text: str | None) -> Gamma:
     except ValueError:
         reason = f"--gamma takes a number or {FREE}, not '{text}'"
         raise MdfconvError(reason, percent_hint(text)) from None
+
+
+def noted(end: Endpoint) -> Endpoint:
+    """Return what an option names; what to know of the name goes to standard error, once."""
+    if end.caution:
+        tell(f"note: {end.caution}")
+    return replace(end, caution="")
+
+
+def asked_endpoint(name: str) -> Endpoint:
+    """Return the distribution of one parameter, and its form, that an option names."""
+    from mdfconv.distributions.endpoint import one_parameter_endpoint
+
+    return noted(one_parameter_endpoint(name))
+
+
+def in_asked_forms(
+    rows: Iterable[dict[str, Any]], ends: Sequence[Endpoint]
+) -> list[dict[str, Any]]:
+    """Return rows of results with each parameter, and its error, in the forms asked for.
+
+    A row has a ``distribution`` by name, its ``parameter``, and perhaps the ``stderr``; one of
+    another distribution stays as it is.
+    """
+    rows_asked = []
+    for row in rows:
+        asked = [end for end in ends if end.distribution.name == row["distribution"]]
+        rows_asked += [row | _stored(row, end) for end in asked] or [row]
+    return rows_asked
+
+
+def _stored(row: dict[str, Any], end: Endpoint) -> dict[str, Any]:
+    if end.encoding is None or row["parameter"] is None:
+        return {}
+    value, slope = end.encode_one(row["parameter"])
+    stored: dict[str, Any] = {"distribution": end.label, "parameter": value}
+    if row.get("stderr") is not None:
+        stored["stderr"] = None if slope is None else slope * row["stderr"]
+    return stored

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.names import asked_endpoint, in_asked_forms
 from mdfconv.cli.options import (
     DpiOption,
     ExposureOption,
@@ -17,7 +16,9 @@ from mdfconv.cli.options import (
     FormatOption,
     MethodOption,
     OptionalMetricOption,
+    asked_endpoint,
     asked_metric,
+    in_asked_forms,
     refuse_given,
 )
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
@@ -84,7 +85,7 @@ def command(
 
     mdfconv plot-error --m-b 0.2 --reference ggx --mdf beckmann --no-csv --output /tmp
     """
-    from mdfconv.conversion.arrays import given_metric
+    from mdfconv.conversion.values import metric_or_default
     from mdfconv.studies.error_curves import curves
 
     if not png and not svg:
@@ -96,7 +97,7 @@ def command(
     endings = [*[".png"] * png, *[".svg"] * svg, *["b.csv"] * csv]
     folder = check_folder(context, output)
     outputs = Outputs(*(folder / f"{name}{end}" for name in sets for end in endings), force=force)
-    shown = given_metric(asked)
+    shown = metric_or_default(asked)
     figures = {name: curves(each, chief, shown, points) for name, each in sets.items()}
     contents = {
         folder / f"{name}{end}": _file(name, drawn, end, dpi=dpi, log=log)

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.names import asked_endpoint
 from mdfconv.cli.options import (
     ExposureOption,
     FixedGammaOption,
@@ -14,6 +13,7 @@ from mdfconv.cli.options import (
     FormatOption,
     FromOption,
     MetricOption,
+    asked_endpoint,
     chosen_metric,
     fixed_gamma,
 )

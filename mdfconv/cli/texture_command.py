@@ -118,12 +118,12 @@ def command(
 
     _check_given(context, source, target)
     refuse_idle_metric(context, method)
-    kept = chosen_metric(metric, exposure)
-    outputs = Outputs(output, png, force=force, inputs=[source_file, *kept.inputs])
+    chosen = chosen_metric(metric, exposure)
+    outputs = Outputs(output, png, force=force, inputs=[source_file, *chosen.inputs])
     rule = TextureRule(
         *with_specular(source, target, specular),
         method,
-        str(kept),
+        str(chosen),
         exponent_max,
         log2_scale,
         fixed_gamma(gamma),
@@ -139,10 +139,10 @@ def command(
             lossy=lossy,
             max_pixels=max_pixels,
             progress=progress,
-            files=files,
+            fill=files.fill,
         )
         if png:
-            from mdfconv.scene.texture.figure import draw_histograms
+            from mdfconv.scene.texture.texel_map import draw_histograms
 
             files.add(png, draw_histograms(report, f"{source_file.name} → {output.name}"))
     for note in report.notes():

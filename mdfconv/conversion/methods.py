@@ -1,30 +1,45 @@
-"""The registry of conversion methods.
+"""The conversion methods, one class each, and the registry of them.
 
-A new method is a module that defines ``METHOD``, and one line in `_MODULES`.
+A new method is a class, and its place in the registry at the end.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.equivalence import ParameterMap, follow, from_root, to_root
+from mdfconv.distributions.endpoint import Endpoint, ParameterMap, follow, from_root, to_root
 from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.distributions.parameter import number_text
+from mdfconv.errors import MdfconvError
 from mdfconv.fitting.maps import StoredFit
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.registry import Registry
 
 
+class Solution(NamedTuple):
+    """Parameters of the target; with them γ and whether it met a limit, where γ was free."""
+
+    parameter: Array
+    gamma: Array | None = None
+    gamma_at_limit: Mask | None = None
+
+
 class Method(ABC):
-    """A rule that takes the parameter of one distribution to that of another."""
+    """A rule that takes the parameter of one distribution to that of another.
+
+    A rule that covers every pair in one step names it in `step`; others say their `route`.
+    """
 
     name: ClassVar[str]
-    source: ClassVar[str]
+    # What it preserves, to follow the word "keeps", unless that is for the metric to say.
+    preserves: ClassVar[str] = ""
+    step: ClassVar[str] = ""
     # Whether the answer depends on the metric; else that is only what the errors measure.
     follows_metric: ClassVar[bool] = False
     # Whether elements of an array that have no answer become NaN, with a warning.
@@ -35,13 +50,13 @@ class Method(ABC):
         """Whether a conversion may call for a caution."""
         return type(self).cautions is not Method.cautions
 
-    @abstractmethod
     def keeps(self, metric: Metric) -> str:
         """Return what the conversion keeps, to follow the word "keeps"."""
+        return metric.keeps if self.follows_metric else self.preserves
 
-    @abstractmethod
     def route(self, source: Distribution, target: Distribution) -> tuple[str, ...] | None:
         """Return the steps of the conversion in words; None if the pair is not covered."""
+        return (self.step,)
 
     @abstractmethod
     def convert(
@@ -52,6 +67,12 @@ class Method(ABC):
         Where the rule leaves the target's legal range it returns what it computes; where it
         computes nothing, NaN.
         """
+
+    def solve(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> Solution:
+        """Return all parameters of the target, as `convert` the first one."""
+        return Solution(np.asarray(self.convert(parameter, source, target, metric)))
 
     def covers(self, source: Distribution, target: Distribution, metric: Metric) -> bool:
         """Return whether the method can answer for a pair under a metric."""
@@ -70,13 +91,7 @@ class Method(ABC):
     def cautions(
         self, parameter: Array, result: Array, source: Distribution, target: Distribution
     ) -> dict[str, Mask]:
-        """Return what a careful user must know of conversions, beyond their error.
-
-        Returns
-        -------
-        dict of str to numpy.ndarray of bool
-            From sentences to which of the conversions they are true of.
-        """
+        """Return what a careful user must know in sentences, and of which numbers they are true."""
         return {}
 
 
@@ -84,20 +99,11 @@ class FormulaMethod(Method):
     """A method made of formulas, looked up by the names of source and target.
 
     A distribution that is another one in another parameter goes through that one's formulas.
-
-    Parameters
-    ----------
-    formulas : dict
-        From (source, target) to the formula.
-    through : dict
-        From the name of a distribution to that of the one all its formulas lead through.
     """
 
-    def __init__(
-        self, formulas: dict[tuple[str, str], ParameterMap], through: dict[str, str] | None = None
-    ) -> None:
-        self._formulas = formulas
-        self._through = through or {}
+    formulas: ClassVar[Mapping[tuple[str, str], ParameterMap]]
+    # From the name of a distribution to that of the one through which all its formulas lead.
+    through: ClassVar[Mapping[str, str]] = {}
 
     def route(self, source: Distribution, target: Distribution) -> tuple[str, ...] | None:
         """Return the formulas of the conversion; None if the pair is not covered."""
@@ -138,11 +144,11 @@ class FormulaMethod(Method):
         if source.second_parameter or target.second_parameter:
             return None
         names = source.name, target.name
-        if names in self._formulas:
-            return [self._formulas[names]]
-        for via in (self._through.get(name) for name in names):
-            if via and {(names[0], via), (via, names[1])} <= self._formulas.keys():
-                return [self._formulas[names[0], via], self._formulas[via, names[1]]]
+        if names in self.formulas:
+            return [self.formulas[names]]
+        for via in (self.through.get(name) for name in names):
+            if via and {(names[0], via), (via, names[1])} <= self.formulas.keys():
+                return [self.formulas[names[0], via], self.formulas[via, names[1]]]
         return None
 
 
@@ -220,18 +226,17 @@ def _sweep(source: Distribution) -> list[float]:
 
 
 class ClosedForm(FormulaMethod):
-    """The paper's formulas, fitted by it to Table 2: they keep the shape of the lobe.
+    """The formulas of Sawicki 2021, fitted to its Table 2: they keep the shape of the lobe.
 
-    They were fitted for m_B from 0.0044 to 0.4473. The two directions of a pair are not
-    exact inverses of each other.
+    Eqs (12)-(15), Tables 3 and 4. They were fitted for m_B from 0.0044 to 0.4473. The two
+    directions of a pair are not exact inverses of each other.
     """
 
     name = "closed-form"
-    source = "Sawicki 2021, eqs (12)-(15), Tables 3 and 4"
-
-    def keeps(self, metric: Metric) -> str:
-        """Return that the formulas keep the shape, whatever the metric of the errors."""
-        return "shape of the lobe, approximately"
+    preserves = "shape of the lobe, approximately"
+    formulas: ClassVar = _FORMULAS
+    # All formulas of Sawicki's distribution lead through Blinn/Phong.
+    through: ClassVar = {"sawicki": "blinn-phong"}
 
     def cautions(
         self, parameter: Array, result: Array, source: Distribution, target: Distribution
@@ -246,22 +251,15 @@ class ClosedForm(FormulaMethod):
         return {outside: (parameter < lower) | (parameter > upper)} | turned
 
 
-_CLOSED_FORM = ClosedForm(_FORMULAS, through={"sawicki": "blinn-phong"})
-
-
 class HalfAngle(Method):
-    """Both distributions fall to half of their value at the normal at the same angle."""
+    """Both distributions fall to half of their value at the normal at the same angle.
+
+    Blinn 1977; Sawicki 2021, eqs (3)-(10).
+    """
 
     name = "half-angle"
-    source = "Blinn 1977; Sawicki 2021, eqs (3)-(10)"
-
-    def keeps(self, metric: Metric) -> str:
-        """Return what the method is named for."""
-        return "angle of half height"
-
-    def route(self, source: Distribution, target: Distribution) -> tuple[str, ...]:
-        """Return the one step, which exists for every pair."""
-        return ("β_half of the source = β_half of the target",)
+    preserves = "angle of half height"
+    step = "β_half of the source = β_half of the target"
 
     def convert(
         self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
@@ -271,28 +269,17 @@ class HalfAngle(Method):
         return result
 
 
-_HALF_ANGLE = HalfAngle()
-
-
 class Ward(FormulaMethod):
     """m_B² N = 2: the rule of thumb of Ward 1996, eq. (11) in Sawicki 2021."""
 
     name = "ward"
-    source = "Ward 1996; Sawicki 2021, eq. (11)"
-
-    def keeps(self, metric: Metric) -> str:
-        """Return the rule keeps roughly the shape."""
-        return "shape of a smooth lobe, roughly"
-
-
-_WARD = Ward(
-    {
+    preserves = "shape of a smooth lobe, roughly"
+    formulas: ClassVar = {
         ("beckmann", "blinn-phong"): ParameterMap("N = 2/m_B² (eq. 11)", lambda m: 2 / m**2),
         ("blinn-phong", "beckmann"): ParameterMap(
             "m_B = √(2/N) (eq. 11)", lambda n: np.sqrt(2 / n)
         ),
     }
-)
 
 
 class Peak(Method):
@@ -303,15 +290,8 @@ class Peak(Method):
     """
 
     name = "peak"
-    source = "equal D(0); for Blinn/Phong m = √(2/(N+2))"
-
-    def keeps(self, metric: Metric) -> str:
-        """Return what the method is named for."""
-        return "peak of the normalized form"
-
-    def route(self, source: Distribution, target: Distribution) -> tuple[str, ...]:
-        """Return the one step, which exists for every pair."""
-        return ("D(0) of the source = D(0) of the target",)
+    preserves = "peak of the normalized form"
+    step = "D(0) of the source = D(0) of the target"
 
     def convert(
         self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
@@ -319,9 +299,6 @@ class Peak(Method):
         """Go through the α with that peak; NaN where the target has no such peak."""
         result: Array = target.from_peak_alpha(source.peak_alpha(parameter))
         return result
-
-
-_PEAK = Peak()
 
 
 class LeastSquares(Method):
@@ -332,16 +309,8 @@ class LeastSquares(Method):
     """
 
     name = "fit"
-    source = "least squares, mdfconv.fitting"
+    step = "least squares"
     follows_metric = True
-
-    def keeps(self, metric: Metric) -> str:
-        """Return what the metric keeps."""
-        return metric.keeps
-
-    def route(self, source: Distribution, target: Distribution) -> tuple[str, ...]:
-        """Return the one step, which exists for every pair."""
-        return ("least squares",)
 
     def convert(
         self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
@@ -360,9 +329,6 @@ class LeastSquares(Method):
         return {sentence: (result == limits.upper) & limits.upper_closed}
 
 
-_FIT = LeastSquares()
-
-
 # Fewer values are fitted sooner than a map is made.
 _MANY = 8192
 
@@ -376,19 +342,15 @@ class Fast(Method):
     """
 
     name = "fast"
-    source = "least squares, mdfconv.fitting, as stored polynomials"
+    step = "stored least squares"
     follows_metric = True
     gaps_as_nan = True
-
-    def keeps(self, metric: Metric) -> str:
-        """Return what the metric keeps."""
-        return metric.keeps
 
     def route(self, source: Distribution, target: Distribution) -> tuple[str, ...] | None:
         """Return the one step; None for pairs without maps, such as those of GTR."""
         metrics = map(metric_named, list_metrics())
         covered = any(self.covers(source, target, metric) for metric in metrics)
-        return ("stored least squares",) if covered else None
+        return (self.step,) if covered else None
 
     def covers(self, source: Distribution, target: Distribution, metric: Metric) -> bool:
         """Return whether there is a map, one to make others from, or a constant."""
@@ -400,10 +362,10 @@ class Fast(Method):
         """Evaluate the polynomials; NaN outside their range."""
         stored = _stored(source, target, metric)
         if len(metric.from_stored()) > 1 and not stored.exact:
-            from mdfconv.fitting.map_making import made_map
+            from mdfconv.fitting.maps import made_map
 
             if parameter.size < _MANY:
-                return _FIT.convert(parameter, source, target, metric)
+                return LeastSquares().convert(parameter, source, target, metric)
             stored = stored.with_map(made_map(*stored.pair, str(metric)))
         return stored(parameter)
 
@@ -415,32 +377,6 @@ class Fast(Method):
 def _stored(source: Distribution, target: Distribution, metric: Metric) -> StoredFit:
     """Return what is stored under a metric, or under the one that it is followed from."""
     return StoredFit(source, target, metric.from_stored()[0])
-
-
-_FAST_FIT = Fast()
-
-
-_DEFAULT, _FAST = "closed-form", "fast"
-
-_REGISTRY: Registry[Method] = Registry("method")
-for _method in (_CLOSED_FORM, _HALF_ANGLE, _WARD, _PEAK, _FIT, _FAST_FIT):
-    _REGISTRY.add(_method.name, _method)
-
-
-def list_methods() -> tuple[Method, ...]:
-    """Return every conversion method, the default first."""
-    return tuple(_REGISTRY)
-
-
-def method_named(name: str) -> Method:
-    """Return the method with a given name.
-
-    Raises
-    ------
-    MdfconvError
-        If the name is not known; the message offers the nearest ones.
-    """
-    return _REGISTRY[name]
 
 
 class BestFit(LeastSquares):
@@ -461,19 +397,54 @@ class BestFit(LeastSquares):
     ) -> list[str]:
         """Return "fast" where the stored fits reach, else "fit"."""
         missing = np.isnan(self._stored(parameter, source, target, metric))
-        return np.where(missing, self.name, _FAST).tolist()
+        return np.where(missing, self.name, Fast.name).tolist()
 
     def _stored(
         self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
     ) -> Array:
         """Return the stored fits, NaN where there is none."""
-        fast = _REGISTRY[_FAST]
+        fast = Fast()
         if not fast.covers(source, target, metric):
             return np.full(parameter.shape, np.nan)
         return fast.convert(parameter, source, target, metric)
 
 
-_BEST_FIT = BestFit()
+class FreeGammaFit(LeastSquares):
+    """The fit of both parameters of a target that has two."""
+
+    def solve(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> Solution:
+        """Fit both parameters."""
+        from mdfconv.fitting.free_gamma import fit_free_gamma
+
+        fits = fit_free_gamma(source, parameter.ravel(), target, metric)
+        shape = parameter.shape
+        return Solution(
+            fits.parameter.reshape(shape), fits.gamma.reshape(shape), fits.at_limit.reshape(shape)
+        )
+
+
+_REGISTRY: Registry[Method] = Registry("method")
+# The default first.
+for _method in (ClosedForm(), HalfAngle(), Ward(), Peak(), LeastSquares(), Fast()):
+    _REGISTRY.add(_method.name, _method)
+
+
+def list_methods() -> tuple[Method, ...]:
+    """Return every conversion method, the default first."""
+    return tuple(_REGISTRY)
+
+
+def method_named(name: str) -> Method:
+    """Return the method with a given name.
+
+    Raises
+    ------
+    MdfconvError
+        If the name is not known; the message offers the nearest ones.
+    """
+    return _REGISTRY[name]
 
 
 def default_method(
@@ -483,7 +454,34 @@ def default_method(
 
     With a metric that is the fit under it; without, the closed form of a pair that has one.
     """
-    closed_form = _REGISTRY[_DEFAULT]
+    closed_form = _REGISTRY[ClosedForm.name]
     if metric_given or closed_form.route(source, target) is None:
-        return _BEST_FIT
+        return BestFit()
     return closed_form
+
+
+def method_with_free_gamma(name: str | None, target: Distribution) -> Method:
+    """Return the method for a free γ; raise if the target has none or another method is named."""
+    if target.second_parameter is None:
+        raise MdfconvError(f"{target.name} has one parameter and no γ to fit")
+    method = FreeGammaFit()
+    if name is not None and method_named(name).name != method.name:
+        raise MdfconvError(f"{method_named(name).name} takes γ as it is", f"{method.name} finds it")
+    return method
+
+
+def check_covered(method: Method, metric: Metric, source: Endpoint, target: Endpoint) -> None:
+    """Raise unless a method has a conversion for a pair under a metric."""
+    pair = source.distribution, target.distribution
+    if method.route(*pair) is None:
+        others = [other.name for other in list_methods() if other.route(*pair) is not None]
+        raise MdfconvError(
+            f"{method.name} has no conversion from {pair[0].label} to {pair[1].label}",
+            f"use {' or '.join(others)}",
+        )
+    if not method.covers(*pair, metric):
+        raise MdfconvError(
+            f"{method.name} has no conversion stored from {pair[0].label} to {pair[1].label} "
+            f"under the {metric} metric",
+            "use fit",
+        )

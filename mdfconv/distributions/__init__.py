@@ -36,19 +36,28 @@ _MODULES = (
 _REGISTRY: Registry[Distribution] = Registry("distribution")
 
 
+for _module in _MODULES:
+    _mdf = import_module(f"{__name__}.{_module}").DISTRIBUTION
+    _REGISTRY.add(_mdf.name, _mdf, _mdf.aliases, _mdf.meant_by)
+
+
 def register(mdf: Distribution) -> None:
     """Add a distribution: every function and command that takes one knows it from here on.
+
+    Parameters
+    ----------
+    mdf : Distribution
+        An instance of a subclass, which says what it must define.
 
     Raises
     ------
     MdfconvError
-        If its name or an alias is taken.
+        If its name or an alias is taken, or what it declares of its lobes does not hold.
     """
+    gammas = mdf.second_parameter.typical if mdf.second_parameter else ()
+    for instance in (mdf, *map(mdf.with_gamma, gammas)):
+        instance.check_declarations()
     _REGISTRY.add(mdf.name, mdf, mdf.aliases, mdf.meant_by)
-
-
-for _module in _MODULES:
-    register(import_module(f"{__name__}.{_module}").DISTRIBUTION)
 
 
 def list_distributions() -> tuple[Distribution, ...]:
@@ -56,24 +65,28 @@ def list_distributions() -> tuple[Distribution, ...]:
     return tuple(_REGISTRY)
 
 
-def distribution(name: str) -> Distribution:
+def distribution(name: str, gamma: float | None = None) -> Distribution:
     """Return the distribution with a given name or alias.
 
     Parameters
     ----------
     name : str
         Name or alias; case does not matter, and ``_``, ``/`` and blanks count as ``-``.
+    gamma : float, optional
+        The second parameter of a distribution that has one; its default if not given.
 
     Raises
     ------
     MdfconvError
         If the name is not known; the message offers the nearest ones. Also if it is that of a
-        stored form, such as ``"ggx:roughness"``.
+        stored form, such as ``"ggx:roughness"``, or γ is illegal or there is none.
 
     Examples
     --------
     >>> distribution("Trowbridge_Reitz").name
     'ggx'
+    >>> distribution("gtr", gamma=1.4)
+    distribution('gtr', gamma=1.4)
     """
     if isinstance(name, str) and ":" in name:
         owner = _REGISTRY[name.partition(":")[0]].name
@@ -81,7 +94,8 @@ def distribution(name: str) -> Distribution:
             f"'{name}' is a stored form of a parameter, and here a distribution is meant",
             f"did you mean {owner}?",
         )
-    return _REGISTRY[name]
+    mdf = _REGISTRY[name]
+    return mdf if gamma is None else mdf.with_gamma(gamma)
 
 
 def one_parameter_distributions() -> list[Distribution]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,19 +22,10 @@ def _identity(parameter: Array) -> Array:
 
 @dataclass(frozen=True)
 class Equivalent:
-    """Another distribution, in whose parameter this one can be expressed.
+    """Another distribution, in whose parameter this one can be expressed by `forward`.
 
-    Parameters
-    ----------
-    name : str
-        The other distribution.
-    same_lobe : bool
-        Whether the two are the same function of β. If not, the sources only let one number
-        stand for both, as Schlick's and Beckmann's m.
-    forward, backward : callable
-        This parameter to the other's, and back; elementwise on arrays.
-    forward_text, backward_text : str
-        The relations in words; "" where there is nothing to say.
+    The two are the same function of β, or (`same_lobe` false) the sources only let one number
+    stand for both, as Schlick's and Beckmann's m. The texts say the relations in words.
     """
 
     name: str
@@ -54,16 +45,9 @@ class Equivalent:
 class MapVariables:
     """The variables in which the stored maps of a conversion are smooth functions.
 
-    Parameters
-    ----------
-    width : callable
-        x for a parameter: the roughness of a smooth surface, at most 1.
-    from_width : callable
-        The parameter for x.
-    concentration : callable
-        κ for a parameter: 1/x² for a smooth surface, 0 for a uniform lobe.
-    from_map : callable
-        The parameter for x of the source and the product x² κ.
+    x = `width` of a parameter is the roughness of a smooth surface, at most 1; κ = `concentration`
+    is 1/x² for a smooth surface, 0 for a uniform lobe. `from_map` returns the parameter for the x
+    of the source and the product x² κ.
     """
 
     width: Callable[[Array], Array]
@@ -78,22 +62,9 @@ class Printed:
 
     They lose digits to cancellation and overflow: that is what the audit and the benchmark hold
     the kernels against. Every function takes the parameter, and γ after it if there is one, and
-    computes in the type of its arguments.
-
-    Parameters
-    ----------
-    unit : callable
-        D̄ of (β, parameter).
-    at_normal : callable
-        D(0) of the normalized form.
-    cosine : callable, optional
-        cos β_half.
-    from_cosine : callable, optional
-        The parameter for cos β_half.
-    peak_alpha : callable, optional
-        The α for which D(0) = 1/(π α²).
-    from_peak_alpha : callable, optional
-        The parameter for that α.
+    computes in the type of its arguments: `unit` D̄ of (β, parameter), `at_normal` D(0) of the
+    normalized form, `cosine` cos β_half, `peak_alpha` the α for which D(0) = 1/(π α²), and the
+    two others their inverses.
     """
 
     unit: Callable[..., Any]
@@ -103,20 +74,56 @@ class Printed:
     peak_alpha: Callable[..., Any] | None = None
     from_peak_alpha: Callable[..., Any] | None = None
 
+    @classmethod
+    def of_alpha(cls, unit: Callable[..., Any], **widths: Callable[..., Any]) -> Printed:
+        """Return those of a distribution for which D(0) = 1/(π α²)."""
+        return cls(
+            unit,
+            lambda alpha, *gamma: 1 / (np.pi * alpha**2),
+            peak_alpha=same,
+            from_peak_alpha=same,
+            **widths,
+        )
+
 
 def same(parameter: Any, *gamma: Any) -> Any:
-    """Return the parameter: the printed relation of those for which D(0) = 1/(π α²)."""
+    """Return the parameter."""
     return parameter
 
 
-def inverse_square_over_pi(parameter: Any, *gamma: Any) -> Any:
-    """Return 1/(π α²) as printed."""
-    return 1 / (np.pi * parameter**2)
+ALPHA_MAP = MapVariables(
+    width=same,
+    from_width=same,
+    concentration=lambda alpha: (1 - alpha) * (1 + alpha) / (alpha * alpha),
+    from_map=lambda x, product: x / np.sqrt(x * x + product),
+)
+# Of an α up to 1.
+BOUNDED_ALPHA_MAP = replace(
+    ALPHA_MAP, from_map=lambda x, product: np.minimum(ALPHA_MAP.from_map(x, product), 1)
+)
+
+
+class EvaluationOptions(TypedDict, total=False):
+    """The options of `Distribution.unit` and its like."""
+
+    phi: ArrayLike | None
+    gamma: ArrayLike | None
+    threads: int
+
+
+class CumulativeOptions(TypedDict, total=False):
+    """The options of `Distribution.cumulative`."""
+
+    gamma: ArrayLike | None
+    complement: bool
+    threads: int
 
 
 _SMALLEST_ANGLE = 1e-30
 # The square of an angle is about the share of the lobe within it: the least one above 0.
 _SMALLEST_DRAWN = 1e-160
+# By how much a few values may contradict what is declared, and how many angles are looked at.
+_DECLARED, _CHECKED_ANGLES = 1e-6, 64
 # Of a central difference in ln p: truncation falls with its square, rounding rises as it falls.
 _STEP = float(np.finfo(float).eps) ** (1 / 3)
 
@@ -143,8 +150,10 @@ class Distribution(ABC):
     parameters : tuple of Parameter
         The one that is converted, and γ if there are two.
     operations : int
-        Arithmetic operations to evaluate the unit form from cos β, the parameter's constants
-        precomputed; a transcendental function counts as 10.
+        Operations to evaluate the printed unit form from cos β, with sin²β = 1 − cos²β and
+        tan²β = 1/cos²β − 1; a transcendental function counts as 10, a power that is not whole as
+        two of them. What depends on the parameters alone is precomputed, like terms and constants
+        of a sum are collected; the edge and a maximum off the normal are not counted.
     functions : tuple of str
         The transcendental functions of NumPy that the kernel cannot avoid.
     anisotropic : bool
@@ -203,6 +212,16 @@ class Distribution(ABC):
         """The distribution that this one is in another parameter."""
         return None
 
+    def __repr__(self) -> str:
+        gamma = "" if self.second_parameter is None else f", gamma={self.gamma!r}"
+        return f"distribution({self.name!r}{gamma})"
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and np.array_equal(self.gamma, other.gamma)
+
+    def __hash__(self) -> int:
+        return hash((type(self), self.gamma))
+
     @property
     def label(self) -> str:
         """The name, with γ where there is one."""
@@ -220,9 +239,39 @@ class Distribution(ABC):
         changed.gamma = gamma
         return changed
 
+    def check_declarations(self) -> None:
+        """Raise `MdfconvError` if a few values of the lobes contradict what is declared of them."""
+        low, high = self.parameter.typical
+        if self.scales_with_slope:
+            slope = np.array([0.3, 1.0, 3.0])
+            at_low, at_high = (self.cumulative(np.arctan(slope * p), p) for p in (low, high))
+            if not np.allclose(at_low, at_high, rtol=_DECLARED):
+                symbol = self.parameter.symbol
+                raise MdfconvError(
+                    f"{self.label} declares scales_with_slope, but where tan β = {symbol} its "
+                    f"F is {at_low[1]:.6g} at {symbol} = {low:g} and {at_high[1]:.6g} at {high:g}",
+                    "leave it False",
+                )
+        beta = np.linspace(0, 0.5 * np.pi, _CHECKED_ANGLES)
+        for end in (low, high):
+            value = self.unit(beta, end)
+            if not value.max() <= 1 + _DECLARED:
+                raise MdfconvError(
+                    f"the unit form of {self.label} is {value.max():.6g} at β = "
+                    f"{beta[value.argmax()]:.3g} for {self.parameter.symbol} = {end:g}",
+                    "it is D over its maximum, which _off_axis_maximum gives where it is not D(0)",
+                )
+
     def is_same(self, other: Distribution) -> bool:
         """Return whether two distributions take the same parameter for the same lobe."""
         return self.name == other.name and self.gamma == other.gamma
+
+    @overload
+    def unit(self, beta: float, parameter: float, *, gamma: float | None = ...) -> float: ...
+    @overload
+    def unit(
+        self, beta: ArrayLike, parameter: Any, **options: Unpack[EvaluationOptions]
+    ) -> Array: ...
 
     def unit(
         self,
@@ -261,7 +310,14 @@ class Distribution(ABC):
             If a parameter is outside its legal range, or a pair, an azimuth or a γ does not
             apply.
         """
-        return self._evaluate("_unit", beta, parameter, phi, gamma, threads)
+        return self._evaluate("shape", beta, parameter, phi, gamma, threads)
+
+    @overload
+    def normalized(self, beta: float, parameter: float, *, gamma: float | None = ...) -> float: ...
+    @overload
+    def normalized(
+        self, beta: ArrayLike, parameter: Any, **options: Unpack[EvaluationOptions]
+    ) -> Array: ...
 
     def normalized(
         self,
@@ -277,6 +333,13 @@ class Distribution(ABC):
         Parameters, shapes and errors are those of `unit`; the result is in 1/sr.
         """
         return self._evaluate("_normalized", beta, parameter, phi, gamma, threads)
+
+    @overload
+    def cumulative(self, beta: float, parameter: float, *, complement: bool = ...) -> float: ...
+    @overload
+    def cumulative(
+        self, beta: ArrayLike, parameter: ArrayLike, **options: Unpack[CumulativeOptions]
+    ) -> Array: ...
 
     def cumulative(
         self,
@@ -309,6 +372,13 @@ class Distribution(ABC):
         angle = np.minimum(np.abs(as_operand(beta)), np.pi / 2)
         kernel = "_cumulative_tail" if complement else "_cumulative_lobe"
         return self._evaluate(kernel, angle, parameter, None, gamma, threads)
+
+    @overload
+    def sample(self, share: float, parameter: float, *, complement: bool = ...) -> float: ...
+    @overload
+    def sample(
+        self, share: ArrayLike, parameter: ArrayLike, *, complement: bool = ...
+    ) -> Array: ...
 
     def sample(self, share: ArrayLike, parameter: ArrayLike, *, complement: bool = False) -> Any:
         """Return the angle β at which F(β) is given: a half vector for a random number.
@@ -350,6 +420,11 @@ class Distribution(ABC):
             edge = self.edge(legal)
         angle = np.where(tail > 0, angle, np.pi / 2 if edge is None else edge)
         return np.clip(angle, 0, np.pi / 2).reshape(shares.shape)[()]
+
+    @overload
+    def half_width(self, parameter: float) -> float: ...
+    @overload
+    def half_width(self, parameter: ArrayLike) -> Array: ...
 
     def half_width(self, parameter: ArrayLike) -> Any:
         """Return β_half, the angle at which D falls to half of D(0) (Blinn 1977).
@@ -407,15 +482,7 @@ class Distribution(ABC):
         """Kernel of F(β) and 1 − F(β), each with its own digits."""
 
     def cumulative_with_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        """Return F(β) and ∂F/∂ ln p, for fits.
-
-        Parameters
-        ----------
-        beta : numpy.ndarray, shape (n, k)
-            Angles in [0, π/2], radians.
-        parameter : numpy.ndarray, shape (n, 1)
-            Legal parameters p.
-        """
+        """Return F and ∂F/∂ ln p for angles, shape (n, k), and parameters p, shape (n, 1)."""
         share = self._cumulative(beta, parameter)[0]
         if self.scales_with_slope:
             # F is a function of tan β / p, and dF = 2π D sin β cos β dβ.
@@ -435,17 +502,9 @@ class Distribution(ABC):
         return np.zeros_like(parameter)
 
     def smith_lambda(self, slope: Array) -> Array:
-        """Return Smith's Λ for α tan θ, the slope of a direction in units of the roughness.
+        """Return Smith's Λ for α tan θ ≥ 0, the slope of a direction in units of the roughness.
 
-        Parameters
-        ----------
-        slope : numpy.ndarray
-            α tan θ ≥ 0; infinite at grazing.
-
-        Raises
-        ------
-        MdfconvError
-            If no closed form is known.
+        Raise `MdfconvError` if no closed form is known.
         """
         raise MdfconvError(f"{self.name} has no closed form of Smith's masking")
 
@@ -458,17 +517,7 @@ class Distribution(ABC):
         return None
 
     def with_slope(self, beta: Array, parameter: Array, *, normalized: bool) -> tuple[Array, Array]:
-        """Return D and ∂D/∂(ln p), for fits.
-
-        Parameters
-        ----------
-        beta : numpy.ndarray, shape (n, k)
-            Angles in [0, π/2], radians.
-        parameter : numpy.ndarray, shape (n, 1)
-            Legal parameters p.
-        normalized : bool
-            Whether D is the normalized form (1/sr) or the unit form.
-        """
+        """Return D and ∂D/∂ ln p for angles, shape (n, k), and parameters p, shape (n, 1)."""
         value, slope = self._lobe_and_log_slope(beta, parameter)
         if normalized:
             value *= self._at_normal(parameter)
@@ -481,13 +530,13 @@ class Distribution(ABC):
         slope *= value
         return value, slope
 
-    def shape(self, beta: Array, parameter: Array) -> Array:
+    def shape(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         """Return the unit form of unchecked arrays that broadcast, for fits.
 
         As `unit` without its checks and its blocks, which only pay for large arrays; `beta`
         has the shape of the result.
         """
-        value = self._lobe(beta, parameter)
+        value = self._lobe(beta, parameter, out)
         maximum = self._off_axis_maximum(parameter)
         return value if maximum is None else np.divide(value, maximum, out=value)
 
@@ -497,12 +546,6 @@ class Distribution(ABC):
             return np.ones_like(parameter)
         ratio = self._off_axis_maximum(parameter)
         return self._at_normal(parameter) * (1 if ratio is None else ratio)
-
-    def _unit(self, beta: Array, parameter: Array, out: Array) -> None:
-        self._lobe(beta, parameter, out)
-        maximum = self._off_axis_maximum(parameter)
-        if maximum is not None:
-            out /= maximum
 
     def _normalized(self, beta: Array, parameter: Array, out: Array) -> None:
         self._lobe(beta, parameter, out)
@@ -573,9 +616,7 @@ class Distribution(ABC):
     ) -> Any:
         """Check the arguments and evaluate the kernel of a name in blocks."""
         if isinstance(parameter, tuple) or phi is not None:
-            raise MdfconvError(
-                f"{self.name} is isotropic here: it takes one parameter and no azimuth phi"
-            )
+            return self._evaluate_pair(kernel, beta, parameter, phi, threads)
         if self.second_parameter is None:
             if gamma is not None:
                 raise MdfconvError(f"{self.name} has one parameter and no γ")
@@ -588,6 +629,14 @@ class Distribution(ABC):
             getattr(self.with_gammas(gamma), kernel)(beta, parameter, out)
 
         return evaluate(with_gamma, beta, legal, gammas, threads=threads)
+
+    def _evaluate_pair(
+        self, kernel: str, beta: ArrayLike, pair: Any, phi: ArrayLike | None, threads: int
+    ) -> Any:
+        """Evaluate the kernel of a name for a pair of parameters and azimuths."""
+        raise MdfconvError(
+            f"{self.name} is isotropic here: it takes one parameter and no azimuth phi"
+        )
 
     def _held(self, parameter: ArrayLike, *others: Any) -> Any:
         """Return legal parameters that the type in which all is computed can hold."""
@@ -612,7 +661,8 @@ class AnisotropicDistribution(Distribution):
     def _at_normal_pair(self, x: Array, y: Array) -> Array:
         """Kernel of D(0) of the normalized form, 1/sr."""
 
-    def _unit_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
+    def shape_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
+        """Write the unit form for a pair of parameters to `out`."""
         self._lobe_pair(beta, x, y, phi, out)
         # Over all azimuths the maximum is that along the rougher axis.
         maximum = self._off_axis_maximum(np.maximum(x, y))
@@ -623,25 +673,38 @@ class AnisotropicDistribution(Distribution):
         self._lobe_pair(beta, x, y, phi, out)
         out *= self._finite(self._at_normal_pair(x, y))
 
-    def _evaluate(
-        self,
-        kernel: str,
-        beta: ArrayLike,
-        parameter: Any,
-        phi: ArrayLike | None,
-        gamma: ArrayLike | None,
-        threads: int,
+    def _evaluate_pair(
+        self, kernel: str, beta: ArrayLike, pair: Any, phi: ArrayLike | None, threads: int
     ) -> Any:
-        if not isinstance(parameter, tuple) or not hasattr(self, f"{kernel}_pair"):
-            if phi is not None:
-                raise MdfconvError("an azimuth phi needs a pair of parameters")
-            return super()._evaluate(kernel, beta, parameter, phi, gamma, threads)
-        if len(parameter) != 2:
-            raise MdfconvError(f"a pair of parameters has two members, not {len(parameter)}")
+        if not isinstance(pair, tuple):
+            raise MdfconvError("an azimuth phi needs a pair of parameters")
+        if not hasattr(self, f"{kernel}_pair"):
+            return super()._evaluate_pair(kernel, beta, pair, phi, threads)
+        if len(pair) != 2:
+            raise MdfconvError(f"a pair of parameters has two members, not {len(pair)}")
         if phi is None:
             raise MdfconvError("a pair of parameters needs an azimuth phi")
-        x, y = (self._held(value, beta, phi) for value in parameter)
+        x, y = (self._held(value, beta, phi) for value in pair)
         return evaluate(getattr(self, f"{kernel}_pair"), beta, x, y, phi, threads=threads)
+
+
+class AlphaDistribution(Distribution):
+    """A distribution whose parameter is the α of its peak: D(0) = 1/(π α²), or 1/(π α_x α_y)."""
+
+    def _at_normal(self, parameter: Array) -> Array:
+        return self._at_normal_pair(parameter, parameter)
+
+    def _at_normal_pair(self, x: Array, y: Array) -> Array:
+        return 1 / (np.pi * x * y)
+
+    def _log_slope_at_normal(self, parameter: Array) -> Array:
+        return np.full_like(parameter, -2)
+
+    def _peak_alpha(self, parameter: Array) -> Array:
+        return parameter
+
+    def _from_peak_alpha(self, alpha: Array) -> Array:
+        return alpha
 
 
 def _elementwise(function: Kernel, values: ArrayLike) -> Any:
@@ -666,5 +729,4 @@ def find_root(function: Kernel, bracket: tuple[float, float], *arguments: Array)
     result = elementwise.find_root(function, (lower, upper), args=arguments)
     # A function that only approaches 0 towards an end has no root there.
     crosses = function(lower, *arguments) * function(upper, *arguments) < 0
-    root: Array = np.where(result.success & crosses, result.x, np.nan)
-    return root
+    return np.where(result.success & crosses, result.x, np.nan)

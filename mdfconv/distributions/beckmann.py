@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from mdfconv.distributions.base import (
+    ALPHA_MAP,
+    AlphaDistribution,
     AnisotropicDistribution,
-    MapVariables,
     Printed,
-    inverse_square_over_pi,
-    same,
 )
 from mdfconv.distributions.evaluation import (
     Array,
@@ -43,7 +42,7 @@ def _printed_from_cosine(c: Any) -> Any:
     return np.tan(np.arccos(c)) / np.sqrt(float(np.log(2)) - 4 * np.log(c))
 
 
-class Beckmann(AnisotropicDistribution):
+class Beckmann(AlphaDistribution, AnisotropicDistribution):
     """Gaussian slopes: Beckmann & Spizzichino 1963; Cook & Torrance 1981.
 
     Unit form, with t = tan β::
@@ -70,19 +69,9 @@ class Beckmann(AnisotropicDistribution):
     scales_with_slope = True
     smith = True
     encodings = (ROUGHNESS, GLOSSINESS)
-    map_variables = MapVariables(
-        width=same,
-        from_width=same,
-        concentration=lambda m: (1 - m) * (1 + m) / (m * m),
-        from_map=lambda x, product: x / np.sqrt(x * x + product),
-    )
-    printed = Printed(
-        _printed_unit,
-        inverse_square_over_pi,
-        cosine=_printed_cosine,
-        from_cosine=_printed_from_cosine,
-        peak_alpha=same,
-        from_peak_alpha=same,
+    map_variables = ALPHA_MAP
+    printed = Printed.of_alpha(
+        _printed_unit, cosine=_printed_cosine, from_cosine=_printed_from_cosine
     )
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
@@ -93,19 +82,10 @@ class Beckmann(AnisotropicDistribution):
         square = tangent_square(beta, out)
         _times_secant_power(square, square * -slope_scale(x, y, phi))
 
-    def _at_normal(self, parameter: Array) -> Array:
-        return 1 / (np.pi * parameter * parameter)
-
-    def _at_normal_pair(self, x: Array, y: Array) -> Array:
-        return 1 / (np.pi * x * y)
-
     def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         square = tangent_square(beta)
         exponent = square * inverse_square(parameter)
         return _times_secant_power(square, -exponent), 2 * exponent
-
-    def _log_slope_at_normal(self, parameter: Array) -> Array:
-        return np.full_like(parameter, -2)
 
     def mode(self, parameter: Array) -> Array:
         """Return the angle of the maximum: tan²β = 2m² − 1 where m² > ½, else 0."""
@@ -153,12 +133,6 @@ class Beckmann(AnisotropicDistribution):
     def _from_half_tangent(self, tangent: Array) -> Array:
         # Sawicki 2021, eq. (9), with −4 ln cos β = 2 ln(1 + t²): no digits lost when smooth.
         return tangent / np.sqrt(np.log(2) + 2 * np.log1p(np.square(tangent)))
-
-    def _peak_alpha(self, parameter: Array) -> Array:
-        return parameter
-
-    def _from_peak_alpha(self, alpha: Array) -> Array:
-        return alpha
 
 
 def slope_scale(x: Array, y: Array, phi: Array) -> Array:

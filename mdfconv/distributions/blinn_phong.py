@@ -41,10 +41,7 @@ class BlinnPhong(Distribution):
         "ray, about a quarter, is blinn-phong:reflected"
     }
     meant_by: ClassVar = {
-        "shininess": "blinn-phong",
-        "specular-exponent": "blinn-phong",
-        "exponent": "blinn-phong",
-        "ns": "blinn-phong",
+        **dict.fromkeys(("shininess", "specular-exponent", "exponent", "ns"), "blinn-phong"),
         "reflected": "blinn-phong:reflected",
     }
     unit_formula = "cos^N β"

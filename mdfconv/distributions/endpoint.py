@@ -1,7 +1,11 @@
-"""One end of a conversion: a distribution and the encoding of its parameter."""
+"""The ends of a conversion: a distribution, and the form in which its parameter is stored.
+
+Here are the look-up of both by name, and the exact relations between two distributions.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -9,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdfconv.distributions import Distribution, distribution, one_parameter_distribution
-from mdfconv.distributions.dialects import DIALECTS, Specular, dialects_of
+from mdfconv.distributions.dialects import DIALECTS, Dialect, Specular, dialects_of
 from mdfconv.distributions.evaluation import Array, Mask
-from mdfconv.distributions.parameter import Encoding, Parameter
+from mdfconv.distributions.parameter import Encoding, Pairing, Parameter
 from mdfconv.errors import MdfconvError
 from mdfconv.registry import unknown_name
 
@@ -22,20 +26,11 @@ _STEP = 1e-6
 
 @dataclass(frozen=True)
 class Endpoint:
-    """A distribution and, where the value is stored in another form, its encoding.
-
-    Parameters
-    ----------
-    distribution : Distribution
-        The distribution, with its γ if it has one.
-    encoding : Encoding or None
-        The stored form; None for the parameter itself.
-    caution : str
-        What to know of the name by which the user called it; "" for nothing.
-    """
+    """A distribution and, where the value is stored in another form, its encoding."""
 
     distribution: Distribution
     encoding: Encoding | None = None
+    # What to know of the name by which the user called it.
     caution: str = field(default="", compare=False)
 
     @property
@@ -43,6 +38,11 @@ class Endpoint:
         """The name as the user may write it, such as ``"ggx:roughness"``."""
         suffix = f":{self.encoding.name}" if self.encoding else ""
         return f"{self.distribution.name}{suffix}"
+
+    @property
+    def pairing(self) -> Pairing | None:
+        """How a pair is stored, unless each axis is stored by itself."""
+        return self.encoding.pairing if self.encoding else None
 
     @property
     def stored(self) -> Parameter:
@@ -74,21 +74,22 @@ class Endpoint:
         legal = self.stored.accepts(values)
         if self.encoding:
             legal &= ~self.encoding.clamped(values)
-        stored = values if legal.all() else np.where(legal, values, np.nan)
+        values = values if legal.all() else np.where(legal, values, np.nan)
         if not self.encoding:
-            return stored
+            return values
         with np.errstate(all="ignore"):
-            parameter = self.encoding.decode(stored)
+            parameter = self.encoding.decode(values)
         return np.where(self.distribution.parameter.accepts(parameter), parameter, np.nan)
 
     def encode(self, parameter: Array) -> Array:
-        """Return the stored values for parameters; NaN where they cannot be stored."""
-        if not self.encoding:
-            return parameter
-        with np.errstate(all="ignore"):
-            stored = self.encoding.encode(parameter)
-        accepted = self.stored.accepts(stored) | self.encoding.clamped(stored)
-        return np.where(accepted, stored, np.nan)
+        """Return the stored values for parameters; NaN for what is illegal or cannot be stored."""
+        legal = self.distribution.parameter.accepts(parameter)
+        stored = parameter
+        if self.encoding:
+            with np.errstate(all="ignore"):
+                stored = self.encoding.encode(parameter)
+            legal = legal & (self.stored.accepts(stored) | self.encoding.clamped(stored))
+        return stored if legal.all() else np.where(legal, stored, np.nan)
 
     def encode_one(self, parameter: float) -> tuple[float | None, float | None]:
         """Return the stored value of a parameter and how much it changes with it, |ds/dp|.
@@ -109,41 +110,27 @@ class Endpoint:
         symbols = self.stored.symbol, self.distribution.parameter.symbol
         return {clamp.text(*symbols): stored == clamp.stored for clamp in self.encoding.clamps}
 
-    def axes(self, pair: tuple[Any, ...]) -> tuple[Any, ...]:
-        """Return what is stored for each axis by itself, for the pair that the user gives.
-
-        Raises
-        ------
-        MdfconvError
-            If the second number is illegal.
-        """
-        if not self.encoding or not self.encoding.pairing:
-            return pair
-        pairing = self.encoding.pairing
-        first = np.asarray(self.stored.check(pair[0], self.label), dtype=np.float64)
-        second = np.asarray(pairing.second.check(pair[1], self.label), dtype=np.float64)
-        x, y = pairing.axes(first, second)
-        return x[()], y[()]
+    def axes(self, values: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Return what is stored for each axis by itself; raise if a second number is illegal."""
+        if not self.pairing or len(values) == 1:
+            return values
+        first = np.asarray(self.stored.check(values[0], self.label), dtype=np.float64)
+        second = np.asarray(self.pairing.second.check(values[1], self.label), dtype=np.float64)
+        x, y = self.pairing.axes(first, second)
+        return _plain(x), _plain(y)
 
     def pair(self, x: Any, y: Any) -> tuple[Any, Any]:
-        """Return the pair to give to the user, for what is stored for each axis by itself.
-
-        Raises
-        ------
-        MdfconvError
-            If there is no such pair.
-        """
-        if not self.encoding or not self.encoding.pairing:
+        """Return the pair for what is stored for each axis by itself; raise if there is none."""
+        if not self.pairing:
             return x, y
-        pairing = self.encoding.pairing
         with np.errstate(all="ignore"):
-            first, second = pairing.pair(np.asarray(x, float), np.asarray(y, float))
-        if not np.all(self.stored.accepts(first) & pairing.second.accepts(second)):
+            first, second = self.pairing.pair(np.asarray(x, float), np.asarray(y, float))
+        if not np.all(self.stored.accepts(first) & self.pairing.second.accepts(second)):
             raise MdfconvError(
-                f"{self.label} has no such pair: its {pairing.second.name} is "
-                f"{pairing.second.legal}, and x is the rougher axis"
+                f"{self.label} has no such pair: its {self.pairing.second.name} is "
+                f"{self.pairing.second.legal}, and x is the rougher axis"
             )
-        return first[()], second[()]
+        return _plain(first), _plain(second)
 
     def _check_clamps(self, values: ArrayLike) -> None:
         stored = np.asarray(values)
@@ -152,19 +139,13 @@ class Endpoint:
                 raise MdfconvError(f"{self.label} has no inverse here: {text}")
 
 
+def _plain(numbers: Array) -> Any:
+    """Return an array, or the float that it is without dimensions."""
+    return numbers if np.ndim(numbers) else float(numbers)
+
+
 def endpoint(name: str | Endpoint) -> Endpoint:
-    """Return the endpoint for a name such as ``"ggx"`` or ``"ggx:roughness"``.
-
-    Parameters
-    ----------
-    name : str or Endpoint
-        Distribution, with an encoding after a colon if it is not the parameter itself.
-
-    Raises
-    ------
-    MdfconvError
-        If the distribution or the encoding is not known.
-    """
+    """Return the endpoint for a name such as ``"ggx"`` or ``"ggx:roughness"``."""
     if isinstance(name, Endpoint):
         return name
     if not isinstance(name, str):
@@ -177,13 +158,7 @@ def endpoint(name: str | Endpoint) -> Endpoint:
 
 
 def one_parameter_endpoint(name: str | Endpoint) -> Endpoint:
-    """Return the endpoint for a name, as `endpoint`.
-
-    Raises
-    ------
-    MdfconvError
-        As `endpoint`, and if the distribution only makes a difference for pairs of parameters.
-    """
+    """Return the endpoint for a name; raise if its distribution is only for pairs of parameters."""
     end = endpoint(name)
     one_parameter_distribution(end.distribution.name)
     return end
@@ -205,33 +180,20 @@ def _owner(name: str) -> Distribution:
 def endpoints(
     source: str | Endpoint, target: str | Endpoint, gamma: float | None = None
 ) -> tuple[Endpoint, Endpoint]:
-    """Return both ends of a conversion.
-
-    Parameters
-    ----------
-    source, target : str or Endpoint
-        As for `endpoint`.
-    gamma : float, optional
-        The second parameter, for each end that has one; its default if not given.
-
-    Raises
-    ------
-    MdfconvError
-        As `endpoint`, and if γ is illegal or neither end has one.
-    """
+    """Return both ends of a conversion, with a γ for each that has one; raise if neither has."""
     first, last = endpoint(source), endpoint(target)
     if gamma is None:
         return first, last
-    second = [end.distribution.second_parameter for end in (first, last)]
-    if not any(second):
+    if not any(end.distribution.second_parameter for end in (first, last)):
         raise MdfconvError(
             f"neither {first.distribution.name} nor {last.distribution.name} has a second "
             "parameter γ"
         )
-    return (
-        with_gamma(first, gamma) if second[0] else first,
-        with_gamma(last, gamma) if second[1] else last,
+    first, last = (
+        with_gamma(end, gamma) if end.distribution.second_parameter else end
+        for end in (first, last)
     )
+    return first, last
 
 
 def with_gamma(end: Endpoint, gamma: float | None) -> Endpoint:
@@ -244,41 +206,50 @@ def with_gamma(end: Endpoint, gamma: float | None) -> Endpoint:
 def with_specular(source: str, target: str, specular: float | None) -> tuple[str, str]:
     """Return the names of both ends, with a specular weight for those that depend on it.
 
-    Parameters
-    ----------
-    source, target : str
-        As `endpoint` takes them.
-    specular : float or None
-        The weight of the specular lobe, or the luminance of its colour; None changes nothing.
-
-    Raises
-    ------
-    MdfconvError
-        If none of them depends on it.
+    None as the weight changes nothing; one for names that do not depend on it is refused.
     """
     if specular is None:
         return source, target
-    depend = [_takes_specular(name) for name in (source, target)]
-    if not any(depend):
+    source_with, target_with = (_with_weight(name, specular) for name in (source, target))
+    if (source_with, target_with) == (source, target):
         raise MdfconvError(
             f"neither {source} nor {target} depends on a specular weight", argument="specular"
         )
-    setting = f":{specular!r}"
-    return source + setting * depend[0], target + setting * depend[1]
+    return source_with, target_with
 
 
-def _takes_specular(name: str) -> bool:
+def _with_weight(name: str, specular: float) -> str:
     head, _, tail = name.partition(":")
     dialect = dialects_of(distribution(head).name).get(tail.strip().lower())
-    return dialect is not None and dialect.specular is not Specular.no
+    depends = dialect is not None and dialect.specular is not Specular.no
+    return f"{name}:{specular!r}" if depends else name
 
 
 def encodings_of(owner: Distribution) -> list[str]:
     """Return the names of the forms in which a parameter is stored; none if it has but one."""
-    own = [*(encoding.name for encoding in owner.encodings), *dialects_of(owner.name)]
+    forms = list(forms_of(owner))
     # Exponents are not an α.
-    named_by_itself = own and not owner.parameter.larger_is_smoother
-    return [DEFAULT_ENCODING, *own] if named_by_itself else own
+    named_by_itself = forms and not owner.parameter.larger_is_smoother
+    return [DEFAULT_ENCODING, *forms] if named_by_itself else forms
+
+
+def stored_forms(owner: Distribution) -> list[tuple[Endpoint, Dialect | None]]:
+    """Return every form but the parameter itself, and the dialect that it is, if it is one.
+
+    A rule that needs a specular weight is given 1.
+    """
+    forms: list[tuple[Endpoint, Dialect | None]] = []
+    for name, form in forms_of(owner).items():
+        dialect = form if isinstance(form, Dialect) else None
+        needs_weight = dialect is not None and dialect.specular is Specular.needed
+        forms.append((Endpoint(owner, _encoding(owner, name + ":1" * needs_weight)), dialect))
+    return forms
+
+
+def forms_of(owner: Distribution) -> dict[str, Encoding | Dialect]:
+    """Return the stored forms of a parameter by their names, its own first."""
+    own = {encoding.name: encoding for encoding in owner.encodings}
+    return own | dialects_of(owner.name)
 
 
 def _encoding(owner: Distribution, name: str) -> Encoding | None:
@@ -292,9 +263,60 @@ def _encoding(owner: Distribution, name: str) -> Encoding | None:
     if key not in known:
         meant = [owner.meant_by[key]] if key in owner.meant_by else []
         raise unknown_name(f"encoding of {owner.name}", name, known, meant)
-    dialect = dialects_of(owner.name).get(key)
-    if dialect:
-        return dialect.encoding(owner.parameter, setting)
+    form = forms_of(owner).get(key)
+    if isinstance(form, Dialect):
+        return form.encoding(owner.parameter, setting)
     if setting:
         raise MdfconvError(f"{owner.name}:{key} takes no '{setting}'")
-    return {encoding.name: encoding for encoding in owner.encodings}.get(key)
+    return form
+
+
+@dataclass(frozen=True)
+class ParameterMap:
+    """A formula from one distribution's parameter to another's, and where it stops being monotonic.
+
+    The text has its place in the source; it is empty where there is nothing to say.
+    """
+
+    text: str
+    function: Callable[[Array], Array]
+    turns_at: float = float("inf")
+
+
+def to_root(mdf: Distribution, *, same_lobe: bool) -> tuple[Distribution, Sequence[ParameterMap]]:
+    """Return the distribution in whose parameter another one can be expressed, and how.
+
+    A distribution is its own root unless it declares an equivalent, which may have to have the
+    same lobes.
+    """
+    equal = mdf.equivalent
+    if equal is None or (same_lobe and not equal.same_lobe):
+        return mdf, ()
+    return distribution(equal.name), (ParameterMap(equal.forward_text, equal.forward),)
+
+
+def from_root(mdf: Distribution, *, same_lobe: bool) -> Sequence[ParameterMap]:
+    """Return the steps from the root's parameter back, as for `to_root`."""
+    equal = mdf.equivalent
+    if equal is None or (same_lobe and not equal.same_lobe):
+        return ()
+    return (ParameterMap(equal.backward_text, equal.backward),)
+
+
+def exact_route(source: Distribution, target: Distribution) -> Sequence[ParameterMap] | None:
+    """Return the steps between two distributions that have the same lobes; None for others."""
+    if source.is_same(target):
+        return ()
+    first, forward = to_root(source, same_lobe=True)
+    last, _ = to_root(target, same_lobe=True)
+    if not first.is_same(last):
+        return None
+    return (*forward, *from_root(target, same_lobe=True))
+
+
+def follow(steps: Sequence[ParameterMap], parameter: Array) -> Array:
+    """Return what the steps make of parameters, one after the other; infinite at an end of both."""
+    with np.errstate(all="ignore"):
+        for step in steps:
+            parameter = step.function(parameter)
+    return parameter

@@ -188,8 +188,7 @@ def in_parts(run: Callable[[int, int], None], size: int, threads: int) -> None:
 
 def inverse_square(values: Array) -> Array:
     """Return 1/values², finite even where values² underflows, so that 0 times it is 0."""
-    inverse: Array = np.minimum(1 / (values * values), np.finfo(values.dtype).max)
-    return inverse
+    return np.minimum(1 / (values * values), np.finfo(values.dtype).max)
 
 
 def tangent_square(beta: Array, out: Array | None = None) -> Array:
@@ -200,8 +199,7 @@ def tangent_square(beta: Array, out: Array | None = None) -> Array:
 
 def negative_log_tail(lobe: Array, tail: Array) -> Array:
     """Return −ln(1 − F) for F and 1 − F, from the one that has the digits."""
-    logarithm: Array = np.where(lobe < tail, -np.log1p(-lobe), -np.log(tail))
-    return logarithm
+    return np.where(lobe < tail, -np.log1p(-lobe), -np.log(tail))
 
 
 @cache

@@ -7,11 +7,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mdfconv.distributions.base import (
+    BOUNDED_ALPHA_MAP,
+    AlphaDistribution,
     AnisotropicDistribution,
-    MapVariables,
     Printed,
-    inverse_square_over_pi,
-    same,
 )
 from mdfconv.distributions.beckmann import slope_scale
 from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
@@ -30,7 +29,7 @@ def printed_from_cosine(c: Any, gamma: Any) -> Any:
     return np.sqrt((c**2 - 1) / (c**2 - 2 ** (1 / gamma)))
 
 
-class GGX(AnisotropicDistribution):
+class GGX(AlphaDistribution, AnisotropicDistribution):
     """Normals of an ellipsoid: Trowbridge & Reitz 1975; Walter et al. 2007.
 
     Unit form, with t = tan β::
@@ -54,31 +53,16 @@ class GGX(AnisotropicDistribution):
     smith = True
     encodings = (ROUGHNESS, GLOSSINESS)
     meant_by: ClassVar = {
-        "roughness": "ggx:roughness",
-        "principled": "ggx:roughness",
-        "disney": "ggx:roughness",
-        "blender": "ggx:roughness",
-        "gltf": "ggx:roughness",
-        "pbr": "ggx:roughness",
-        "perceptual-roughness": "ggx:roughness",
+        **dict.fromkeys(("roughness", "principled", "disney", "blender"), "ggx:roughness"),
+        **dict.fromkeys(("gltf", "pbr", "perceptual-roughness"), "ggx:roughness"),
         "alpha": "ggx",
-        "glossiness": "ggx:glossiness",
-        "gloss": "ggx:glossiness",
-        "smoothness": "ggx:glossiness",
+        **dict.fromkeys(("glossiness", "gloss", "smoothness"), "ggx:glossiness"),
     }
-    map_variables = MapVariables(
-        width=same,
-        from_width=same,
-        concentration=lambda alpha: (1 - alpha) * (1 + alpha) / (alpha * alpha),
-        from_map=lambda x, product: np.minimum(x / np.sqrt(x * x + product), 1),
-    )
-    printed = Printed(
+    map_variables = BOUNDED_ALPHA_MAP
+    printed = Printed.of_alpha(
         lambda beta, alpha: (alpha**2 / (np.cos(beta) ** 2 * (alpha**2 - 1) + 1)) ** 2,
-        inverse_square_over_pi,
         cosine=lambda alpha: printed_cosine(alpha, np.full_like(alpha, 2)),
         from_cosine=lambda c: printed_from_cosine(c, np.full_like(c, 2)),
-        peak_alpha=same,
-        from_peak_alpha=same,
     )
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
@@ -86,12 +70,6 @@ class GGX(AnisotropicDistribution):
 
     def _lobe_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
         trowbridge_reitz(beta, slope_scale(x, y, phi), out)
-
-    def _at_normal(self, parameter: Array) -> Array:
-        return 1 / (np.pi * parameter * parameter)
-
-    def _at_normal_pair(self, x: Array, y: Array) -> Array:
-        return 1 / (np.pi * x * y)
 
     def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         square = tangent_square(beta)
@@ -102,9 +80,6 @@ class GGX(AnisotropicDistribution):
         ratio /= fall
         ratio *= 4
         return np.square(square, out=square), ratio
-
-    def _log_slope_at_normal(self, parameter: Array) -> Array:
-        return np.full_like(parameter, -2)
 
     def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         ratio = tangent_square(beta) * inverse_square(parameter)
@@ -130,12 +105,6 @@ class GGX(AnisotropicDistribution):
     def _from_half_tangent(self, tangent: Array) -> Array:
         # Sawicki 2021, eq. (5), likewise.
         return tangent / np.sqrt(_EXCESS + np.sqrt(2) * np.square(tangent))
-
-    def _peak_alpha(self, parameter: Array) -> Array:
-        return parameter
-
-    def _from_peak_alpha(self, alpha: Array) -> Array:
-        return alpha
 
 
 def trowbridge_reitz(beta: Array, scale: Array, out: Array | None) -> Array:

@@ -85,10 +85,10 @@ class Parameter:
     def accepts(self, values: Array) -> Any:
         """Return where values are finite and inside the legal range (bool, same shape)."""
         # A limit that a short type cannot hold is infinite there, which is right.
+        above = np.greater_equal if self.lower_closed else np.greater
+        below = np.less_equal if self.upper_closed else np.less
         with np.errstate(over="ignore"):
-            low = values >= self.lower if self.lower_closed else values > self.lower
-            high = values <= self.upper if self.upper_closed else values < self.upper
-            return low & high & (values < np.inf)
+            return above(values, self.lower) & below(values, self.upper) & (values < np.inf)
 
     def held(self, dtype: np.dtype[Any]) -> tuple[float, float]:
         """Return between which values a lobe is one in a type of floats.

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from mdfconv.distributions.base import (
-    Distribution,
+    BOUNDED_ALPHA_MAP,
+    AlphaDistribution,
     Equivalent,
-    MapVariables,
     Printed,
-    inverse_square_over_pi,
-    same,
 )
-from mdfconv.distributions.double_double import distance_to_cosine
 from mdfconv.distributions.evaluation import Array, tangent_square
 from mdfconv.distributions.parameter import Parameter
 
@@ -33,7 +30,7 @@ def _printed_unit(beta: Any, m: Any) -> Any:
     return np.where(x > 0, m**5 * x / (c * (m * x**2 - x**2 + m**2) ** 2), 0)
 
 
-class Schlick(Distribution):
+class Schlick(AlphaDistribution):
     """Beckmann as a rational function: Schlick 1994 (An Inexpensive BRDF Model).
 
     Unit form, with x = cos β + m − 1 ≥ 0 and 0 where x < 0::
@@ -58,13 +55,8 @@ class Schlick(Distribution):
         forward_text="schlick has beckmann's m_B",
         backward_text="schlick has beckmann's m_B",
     )
-    map_variables = MapVariables(
-        width=same,
-        from_width=same,
-        concentration=lambda m: (1 - m) * (1 + m) / (m * m),
-        from_map=lambda x, product: np.minimum(x / np.sqrt(x * x + product), 1),
-    )
-    printed = Printed(_printed_unit, inverse_square_over_pi, peak_alpha=same, from_peak_alpha=same)
+    map_variables = BOUNDED_ALPHA_MAP
+    printed = Printed.of_alpha(_printed_unit)
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         # Angles often come sorted or in tiles: of whole blocks beyond the edge nothing is computed.
@@ -94,9 +86,6 @@ class Schlick(Distribution):
         y /= fall
         return y
 
-    def _at_normal(self, parameter: Array) -> Array:
-        return 1 / (np.pi * parameter * parameter)
-
     def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         value = self._lobe(beta, parameter)
         w = np.minimum(2 * np.square(np.sin(0.5 * beta)) / parameter, 1)
@@ -107,9 +96,6 @@ class Schlick(Distribution):
         # At and beyond the edge D is 0, and so is its slope.
         y = np.where(y > 0, y, 1)
         return value, w / y + 2 * w * ((2 - w) / parameter + 2 * bend * y) / fall
-
-    def _log_slope_at_normal(self, parameter: Array) -> Array:
-        return np.full_like(parameter, -2)
 
     def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         angle, m = np.broadcast_arrays(beta, parameter)
@@ -153,12 +139,6 @@ class Schlick(Distribution):
         """Return the end of the support, cos β = 1 − m."""
         return 2 * np.arcsin(np.sqrt(0.5 * parameter))
 
-    def _peak_alpha(self, parameter: Array) -> Array:
-        return parameter
-
-    def _from_peak_alpha(self, alpha: Array) -> Array:
-        return alpha
-
 
 def _sharpen_edge(y: Array, beta: Array, parameter: Array) -> bool:
     """Recompute y = x/m where it nearly vanishes, in place and to working precision.
@@ -186,12 +166,65 @@ def _sharpen_edge(y: Array, beta: Array, parameter: Array) -> bool:
 def _precise_edge(m: Array) -> tuple[Array, Array]:
     """Return the end of the support in two parts, to twice the working precision."""
     edge = 2 * np.arcsin(np.sqrt(0.5 * m))
-    return edge, distance_to_cosine(edge, m) / np.sin(edge)
+    return edge, _distance_to_cosine(edge, m) / np.sin(edge)
 
 
 @lru_cache(maxsize=64)
 def _edge_of(m: float) -> tuple[Array, Array]:
     return _precise_edge(np.array([m]))
+
+
+# An unevaluated sum of two doubles. The algorithms are Dekker's (1971), as collected by Hida, Li &
+# Bailey (2001).
+DoubleDouble: TypeAlias = tuple[Array, Array]
+
+_SPLITTER = 134217729.0  # 2²⁷ + 1
+# (π/2)^(2k)/(2k)! drops below 1e-32 at k = 18.
+_COSINE_TERMS = 18
+
+
+def _distance_to_cosine(beta: Array, m: Array) -> Array:
+    """Return m − (1 − cos β) to full relative precision, even where it nearly vanishes."""
+    square = _product(beta, beta)
+    # 1 − cos β = ½β² (1 − β²/12 (1 − β²/30 (1 − …))), innermost bracket first.
+    bracket: DoubleDouble = (np.ones_like(beta), np.zeros_like(beta))
+    for k in range(_COSINE_TERMS, 0, -1):
+        term = _divide(_multiply(square, bracket), (2 * k + 1) * (2 * k + 2))
+        high, low = _sum(np.ones_like(beta), -term[0])
+        bracket = _sum(high, low - term[1])
+    drop = _multiply(square, bracket)
+    high, low = _sum(m, -0.5 * drop[0])
+    return high + (low - 0.5 * drop[1])
+
+
+def _sum(a: Array, b: Array) -> DoubleDouble:
+    total = a + b
+    virtual = total - a
+    return total, (a - (total - virtual)) + (b - virtual)
+
+
+def _product(a: Array, b: Array) -> DoubleDouble:
+    product = a * b
+    a_high, a_low = _split(a)
+    b_high, b_low = _split(b)
+    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+def _split(a: Array) -> DoubleDouble:
+    scaled = _SPLITTER * a
+    high = scaled - (scaled - a)
+    return high, a - high
+
+
+def _multiply(a: DoubleDouble, b: DoubleDouble) -> DoubleDouble:
+    high, low = _product(a[0], b[0])
+    return _sum(high, low + a[0] * b[1] + a[1] * b[0])
+
+
+def _divide(a: DoubleDouble, divisor: float) -> DoubleDouble:
+    quotient = a[0] / divisor
+    high, low = _product(quotient, np.full_like(quotient, divisor))
+    return _sum(quotient, ((a[0] - high) - low + a[1]) / divisor)
 
 
 DISTRIBUTION = Schlick()

@@ -6,13 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import (
-    Distribution,
-    Equivalent,
-    Printed,
-    inverse_square_over_pi,
-    same,
-)
+from mdfconv.distributions.base import AlphaDistribution, Equivalent, Printed
 from mdfconv.distributions.evaluation import (
     Array,
     inverse_square,
@@ -35,7 +29,7 @@ def _printed_unit(beta: Any, alpha: Any, gamma: Any) -> Any:
     return np.where(off_axis, value / maximum, value)
 
 
-class StudentT(Distribution):
+class StudentT(AlphaDistribution):
     """Slopes with the tails of a Student-t distribution: Ribardière et al. 2017.
 
     With t = tan β and x = t²/((γ−1) α²)::
@@ -70,14 +64,11 @@ class StudentT(Distribution):
     )
     operations = 26
     scales_with_slope = True
-    printed = Printed(
+    printed = Printed.of_alpha(
         _printed_unit,
-        inverse_square_over_pi,
         from_cosine=lambda c, gamma: (
             np.tan(np.arccos(c)) / np.sqrt((gamma - 1) * ((2 / c**4) ** (1 / gamma) - 1))
         ),
-        peak_alpha=same,
-        from_peak_alpha=same,
     )
 
     @property
@@ -104,17 +95,11 @@ class StudentT(Distribution):
         value /= x
         return np.square(value, out=value)
 
-    def _at_normal(self, parameter: Array) -> Array:
-        return 1 / (np.pi * parameter * parameter)
-
     def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         square = tangent_square(beta)
         x = square * (inverse_square(parameter) / (self.gamma - 1))
         value = np.square((1 + square) * np.exp(-0.5 * self.gamma * np.log1p(x)))
         return value, 2 * self.gamma * x / (1 + x)
-
-    def _log_slope_at_normal(self, parameter: Array) -> Array:
-        return np.full_like(parameter, -2)
 
     def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
         x = tangent_square(beta) * (inverse_square(parameter) / (self.gamma - 1))
@@ -158,12 +143,6 @@ class StudentT(Distribution):
         square = np.square(tangent)
         x = np.expm1((np.log(2) + 2 * np.log1p(square)) / self.gamma)
         return tangent / np.sqrt((self.gamma - 1) * x)
-
-    def _peak_alpha(self, parameter: Array) -> Array:
-        return parameter
-
-    def _from_peak_alpha(self, alpha: Array) -> Array:
-        return alpha
 
 
 DISTRIBUTION = StudentT()

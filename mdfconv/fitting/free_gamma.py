@@ -11,12 +11,13 @@ from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Indices, Mask
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.problem import FitProblem, bounded_tangent
+from mdfconv.fitting.problem import FitProblem, FitTask, bounded_tangent
 from mdfconv.fitting.quadrature import Quadrature, SmoothQuadrature
 from mdfconv.fitting.solve import candidates, descend
 
-# Marquardt's factor of the diagonal: where it starts, by how much it falls and rises, its least.
-_DAMPING, _EASES, _TIGHTENS, _LEAST_DAMPING = 1e-3, 0.1, 8.0, 1e-12
+# Marquardt's factor of the diagonal: where it starts, what it falls and rises by, its least.
+_DAMPING, _LEAST_DAMPING = 1e-3, 1e-12
+_EASES, _TIGHTENS = 0.1, 8.0
 # Of the variables: for slopes from differences, and the step at which a search ends.
 _DIFFERENCE, _SMALLEST_STEP = 1e-5, 1e-10
 _MOST_STEPS = 100
@@ -52,12 +53,12 @@ def least_squares(
         moving &= np.abs(tried - at).max(axis=1) > _SMALLEST_STEP
         if not moving.any():
             break
-        there = residual(tried)
-        reached = np.einsum("ik,ik->i", there, there)
-        better = moving & (reached < distance)
+        tried_value = residual(tried)
+        tried_distance = np.einsum("ik,ik->i", tried_value, tried_value)
+        better = moving & (tried_distance < distance)
         at = np.where(better[:, None], tried, at)
-        value = np.where(better[:, None], there, value)
-        distance = np.where(better, reached, distance)
+        value = np.where(better[:, None], tried_value, value)
+        distance = np.where(better, tried_distance, distance)
         damping = np.maximum(damping * np.where(better, _EASES, _TIGHTENS), _LEAST_DAMPING)
     return at, distance
 
@@ -66,13 +67,11 @@ def _slopes(residual: Callable[[Array], Array], at: Array, low: Array, high: Arr
     """Return the slopes of the residuals, shape (n, v, k)."""
     slopes = []
     for variable in range(at.shape[1]):
-        ends = []
-        for side in (-_DIFFERENCE, _DIFFERENCE):
-            moved = at.copy()
-            moved[:, variable] += side
-            ends.append(np.clip(moved, low, high))
-        width = ends[1][:, variable] - ends[0][:, variable]
-        slopes.append((residual(ends[1]) - residual(ends[0])) / width[:, None])
+        aside = np.zeros(at.shape[1])
+        aside[variable] = _DIFFERENCE
+        below, above = (np.clip(moved, low, high) for moved in (at - aside, at + aside))
+        width = above[:, variable] - below[:, variable]
+        slopes.append((residual(above) - residual(below)) / width[:, None])
     return np.stack(slopes, axis=1)
 
 
@@ -96,7 +95,7 @@ _SCANNED = 13
 # Kinks stay where they were while both parameters are found: the next pass puts them right.
 _PASSES = 3
 # A start need not be as near as where one parameter alone is found: every other candidate will do.
-_EVERY = 2
+_STRIDE = 2
 # The candidates of a scan, 90 × 76 angles a row, stay in the cache.
 _BATCH = 64
 # Nearer than this share to an end of the range, γ is at the end.
@@ -148,85 +147,63 @@ def fit_free_gamma(
     shape = target.second_parameter
     if shape is None:
         raise MdfconvError(f"{target.name} has one parameter and no γ")
+    task = FitTask(source, parameter, target, metric, quadrature)
     rows = np.arange(parameter.size)
     # Where nothing fits the result is NaN, which says so.
     with np.errstate(all="ignore"):
         parts = [
-            _fit_batch(source, parameter, target, metric, quadrature, rows[at : at + _BATCH])
-            for at in range(0, parameter.size, _BATCH)
+            _fit_batch(task, rows[start : start + _BATCH])
+            for start in range(0, parameter.size, _BATCH)
         ]
     best, gamma, distance = np.concatenate(parts or [np.empty((3, 0))], axis=1)
     best[~np.isfinite(distance)] = np.nan
     return FreeFit(best, gamma, distance, np.isin(gamma, shape.fit_range))
 
 
-def _start(
-    source: Distribution,
-    parameter: Array,
-    target: Distribution,
-    metric: Metric,
-    quadrature: Quadrature | None,
-    rows: Indices,
-) -> Array:
-    """Return ln p and ln γ of the lowest of many candidates, shape (n, 2), inside the bounds."""
-    every = np.arange(rows.size)
-    lowest, start = np.full(rows.size, np.inf), np.zeros((rows.size, 2))
-    low, high = np.log(target.parameters[1].fit_range)
-    for log_gamma in np.linspace(low, high, _SCANNED):
-        shaped = target.with_gamma(float(np.exp(log_gamma)))
-        problem = FitProblem(source, parameter, shaped, metric, quadrature, rows)
-        with np.errstate(all="ignore"):
-            scanned = candidates(problem)[:, ::_EVERY]
-            distance = problem.coarse_distance(scanned)
-        column = np.argmin(np.where(np.isnan(distance), np.inf, distance), axis=1)
-        best = np.stack([np.log(scanned[every, column]), np.full(rows.size, log_gamma)], axis=1)
-        lower = distance[every, column] < lowest
-        lowest[lower], start[lower] = distance[every, column][lower], best[lower]
-    start[:, 0] = np.minimum(start[:, 0], np.log(target.parameter.upper) - _AT_END)
-    start[:, 1] = np.clip(start[:, 1], low + _AT_END, high - _AT_END)
-    return start
-
-
-def _fit_batch(
-    source: Distribution,
-    parameter: Array,
-    target: Distribution,
-    metric: Metric,
-    quadrature: Quadrature | None,
-    rows: Indices,
-) -> Array:
+def _fit_batch(task: FitTask, rows: Indices) -> Array:
     """Return the first parameters, γ and distances of some of the fits, shape (3, rows)."""
-    fit_range = target.parameters[1].fit_range
+    if task.quadrature is None and task.metric.over_angles:
+        # The best lobes are about as wide as the source's.
+        task, rows = task.part(rows), np.arange(rows.size)
+        width = np.arctan(bounded_tangent(task.source, task.parameter))
+        task = task._replace(quadrature=SmoothQuadrature(width, steep=task.metric.steep))
+    target, fit_range = task.target, task.target.parameters[1].fit_range
     low = np.array([-np.inf, np.log(fit_range[0])])
     high = np.log([target.parameter.upper, fit_range[1]])
-    if quadrature is None and metric.over_angles:
-        # The best lobes are about as wide as the source's.
-        parameter, rows = parameter[rows], np.arange(rows.size)
-        quadrature = SmoothQuadrature(np.arctan(bounded_tangent(source, parameter)))
-    x = _start(source, parameter, target, metric, quadrature, rows)
-
-    def problem(shaped: Distribution, some: Indices) -> FitProblem:
-        return FitProblem(source, parameter, shaped, metric, quadrature, rows[some])
-
-    every = np.arange(rows.size)
-    for _ in range(_PASSES if metric.kinks else 1):
-        near = problem(target.with_gammas(np.exp(x[:, 1:])), every)
+    x = _start(task, rows)
+    for _ in range(_PASSES if task.metric.kinks else 1):
+        near = task._replace(target=target.with_gammas(np.exp(x[:, 1:]))).problem(rows)
         x, distance = least_squares(_residual(near, target, x), x, low, high)
     best, gamma = np.exp(x).T
     for end in fit_range:
-        there = np.flatnonzero(np.abs(x[:, 1] - np.log(end)) < _AT_END)
-        if there.size:
-            gamma[there] = end
-            at_end = problem(target.with_gamma(end), there)
-            best[there], distance[there] = descend(at_end, best[there])
+        at_end = np.flatnonzero(np.abs(x[:, 1] - np.log(end)) < _AT_END)
+        if at_end.size:
+            gamma[at_end] = end
+            problem = task._replace(target=target.with_gamma(end)).problem(rows[at_end])
+            best[at_end], distance[at_end] = descend(problem, best[at_end])
     return np.stack([best, gamma, distance])
+
+
+def _start(task: FitTask, rows: Indices) -> Array:
+    """Return ln p and ln γ of the lowest of many candidates, shape (n, 2), inside the bounds."""
+    every_row = np.arange(rows.size)
+    lowest, start = np.full(rows.size, np.inf), np.zeros((rows.size, 2))
+    low, high = np.log(task.target.parameters[1].fit_range)
+    for log_gamma in np.linspace(low, high, _SCANNED):
+        shaped = task.target.with_gamma(float(np.exp(log_gamma)))
+        problem = task._replace(target=shaped).problem(rows)
+        scanned = candidates(problem)[:, ::_STRIDE]
+        distance = problem.coarse_distance(scanned)
+        column = np.argmin(np.where(np.isnan(distance), np.inf, distance), axis=1)
+        best = np.stack([np.log(scanned[every_row, column]), np.full(rows.size, log_gamma)], axis=1)
+        lower = distance[every_row, column] < lowest
+        lowest[lower], start[lower] = distance[every_row, column][lower], best[lower]
+    start[:, 0] = np.minimum(start[:, 0], np.log(task.target.parameter.upper) - _AT_END)
+    start[:, 1] = np.clip(start[:, 1], low + _AT_END, high - _AT_END)
+    return start
 
 
 def _residual(near: FitProblem, target: Distribution, x: Array) -> Callable[[Array], Array]:
     """Return the residuals as a function of ln p and ln γ, on the samples for some of them."""
     residual = near.residual(np.exp(x[:, 0]))
-
-    def of_logarithms(x: Array) -> Array:
-        return residual(target.with_gammas(np.exp(x[:, 1:])), np.exp(x[:, 0]))
-
-    return of_logarithms
+    return lambda x: residual(target.with_gammas(np.exp(x[:, 1:])), np.exp(x[:, 0]))

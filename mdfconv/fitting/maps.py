@@ -9,18 +9,21 @@ polynomials on a few pieces, made from the fit by ``python -m tests.generate_fas
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from mdfconv.distributions import Distribution
-from mdfconv.distributions.equivalence import follow, from_root, to_root
+from mdfconv.distributions import Distribution, distribution
+from mdfconv.distributions.base import MapVariables
+from mdfconv.distributions.endpoint import follow, from_root, to_root
 from mdfconv.distributions.evaluation import Array
-from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.metrics.base import scaled
+from mdfconv.fitting.metrics import Metric, metric_named
+from mdfconv.fitting.problem import FitTask
 
 FILE = Path(__file__).parent / "data" / "maps.npz"
 # So many values and their intermediates stay in the cache; fewer would be computed no sooner, and
@@ -32,14 +35,9 @@ _BLOCK = 131072
 class Map:
     """The stored fit of one pair of distributions under one metric.
 
-    Parameters
-    ----------
-    edges : numpy.ndarray, shape (pieces + 1,)
-        Where the pieces begin and end in x; the first edge is 0.
-    coefficients : tuple of numpy.ndarray
-        For each piece those of a polynomial in z, which runs from −1 to 1, constant first.
-    factored : bool
-        Whether both lobes become uniform at x = 1, so that x² κ/(1−x²) is stored.
+    Each piece between two `edges` in x, of which the first is 0, has the coefficients of a
+    polynomial in z from −1 to 1, constant first. `factored` says whether both lobes become uniform
+    at x = 1, so that x² κ/(1−x²) is stored.
     """
 
     edges: Array
@@ -70,20 +68,6 @@ def horner(coefficients: Array, z: Array) -> Array:
     return value
 
 
-def pack(maps: dict[str, Map]) -> dict[str, Array]:
-    """Return maps as the arrays of the data file."""
-    every = list(maps.values())
-    pieces = [piece for stored in every for piece in stored.coefficients]
-    return {
-        "names": np.array(list(maps)),
-        "factored": np.array([stored.factored for stored in every]),
-        "pieces": np.array([len(stored.coefficients) for stored in every]),
-        "terms": np.array([piece.size for piece in pieces]),
-        "edges": np.concatenate([stored.edges for stored in every]),
-        "coefficients": np.concatenate(pieces),
-    }
-
-
 @cache
 def load() -> dict[str, Map]:
     """Return the stored maps; their names are metric, source and target between blanks."""
@@ -101,26 +85,10 @@ def load() -> dict[str, Map]:
 
 
 class StoredFit:
-    """The fits of one pair of distributions under one metric.
+    """The fits of one pair of distributions under one metric: a map, or one constant.
 
-    Parameters
-    ----------
-    source, target : Distribution
-        The pair. A distribution that is another one in another parameter has that one's maps,
-        as a target its own if they are stored.
-    metric : Metric
-        What they keep; between two that convert by a constant there is no need of a map.
-
-    Attributes
-    ----------
-    known : bool
-        Whether there are any.
-    map : Map or None
-        The polynomials, where there are some.
-    pair : tuple of str
-        Source and target of the map, "" where there is none.
-    variables : tuple of MapVariables
-        Those of the pair, where there is a map.
+    A distribution that is another one in another parameter has that one's maps, as a target its
+    own if they are stored. `pair` and `variables` are those of the map.
     """
 
     def __init__(self, source: Distribution, target: Distribution, metric: Metric) -> None:
@@ -131,19 +99,14 @@ class StoredFit:
         self._symbol, self._above = source.parameter.symbol, source.parameter.larger_is_smoother
         self._ratio = metric.ratio(self._first, self._last)
         self.map: Map | None = None
-        self.pair = "", ""
-        if self._ratio is None:
-            self._find(target, str(metric))
-
-    def _find(self, target: Distribution, metric: str) -> None:
-        for last in (target, self._last):
+        for last in (target, self._last) if self._ratio is None else ():
             stored = load().get(f"{metric} {self._first.name} {last.name}")
             if stored and self._first.map_variables and last.map_variables:
-                self.map, self.variables = stored, (self._first.map_variables, last.map_variables)
-                self.pair = self._first.name, last.name
+                self.map, self.pair = stored, (self._first.name, last.name)
+                self.variables = self._first.map_variables, last.map_variables
                 if last is target:
                     self._back = ()
-                return
+                break
 
     @property
     def exact(self) -> bool:
@@ -164,17 +127,19 @@ class StoredFit:
     def __call__(self, parameter: Array) -> Array:
         """Return the target's parameters (any shape); NaN beyond the range of the map."""
         if self._ratio is not None:
-            first = follow(self._forward, parameter)
-            return follow(self._back, scaled(first, self._ratio, self._last))
+            last = np.minimum(
+                follow(self._forward, parameter) * self._ratio, self._last.parameter.upper
+            )
+            return follow(self._back, last)
         assert self.map is not None, "asked only for what is known"
         source, target = self.variables
         values = parameter.ravel()
-        answers = np.empty_like(values)
+        fits = np.empty_like(values)
         for start in range(0, values.size, _BLOCK):
             block = slice(start, start + _BLOCK)
             x = source.width(follow(self._forward, values[block]))
-            answers[block] = follow(self._back, target.from_map(x, self.map(x)))
-        return answers.reshape(parameter.shape)
+            fits[block] = follow(self._back, target.from_map(x, self.map(x)))
+        return fits.reshape(parameter.shape)
 
     def range_text(self) -> str:
         """Return which parameters of the source the maps cover; "" for all."""
@@ -183,3 +148,134 @@ class StoredFit:
         end = self.variables[0].from_width(np.asarray(self.map.edges[-1]))
         end = follow(self._onward, end)
         return f"{self._symbol} {'≥' if self._above else '≤'} {float(end):.6g}"
+
+
+# Where a polynomial is fitted, where it is checked, and how long it may be.
+_NODES, _CHECKS, _MOST_TERMS = 32, 37, 25
+# A bend is looked for where so many halvings have not helped: where second differences of a few
+# points stand out, again and again.
+_BEND_DEPTHS, _BEND_STEPS, _BEND_POINTS, _STANDS_OUT = (2, 5), 20, 9, 8.0
+# A fifth of what is promised for maps that are made when they are asked for; x where they end.
+# What is not smooth at a scale of 1/50 has no map: lobes that are clipped as a whole have not even
+# one fit.
+_MADE_TOLERANCE, _MADE_END, _MADE_NARROWEST = 2e-5, 1 - 1e-9, 0.02
+# At 0 there is no surface.
+_LEAST_X = 1e-9
+# The polynomial of a piece without fits.
+_NO_FIT = np.array([np.nan])
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A polynomial in z on a part of the range of x, and its worst error that was seen.
+
+    The error is relative, of the target's parameter; infinite where there is no fit.
+    """
+
+    low: float
+    high: float
+    coefficients: Array
+    error: float
+
+
+@dataclass(frozen=True)
+class MapMaker:
+    """One map in the making, from fits: a function of parameters that is NaN where there is none.
+
+    A polynomial may leave a relative error of the `tolerance`; a piece that has not come within it
+    at the width `narrowest`, in x, is left as it is.
+    """
+
+    variables: tuple[MapVariables, MapVariables]
+    factored: bool
+    fits: Callable[[Array], Array]
+    tolerance: float
+    narrowest: float
+
+    def fitted(self, x: Array) -> Array:
+        """Return the target's parameters at x, shape (n,)."""
+        return self.fits(self.variables[0].from_width(x))
+
+    def product(self, x: Array, fitted: Array) -> Array:
+        """Return what a map stores for parameters of the target."""
+        product = x * x * self.variables[1].concentration(fitted)
+        return product / ((1 - x) * (1 + x)) if self.factored else product
+
+    def pieces(self, low: float, high: float, depth: int = 0) -> Iterator[Piece]:
+        """Yield polynomials between two x, each within the tolerance or very narrow."""
+        piece = self._piece(low, high)
+        done = piece.error < self.tolerance or piece.coefficients is _NO_FIT
+        if done or high - low < self.narrowest:
+            yield piece
+            return
+        bend = self._bend(low, high) if depth in _BEND_DEPTHS else None
+        middle = 0.5 * (low + high) if bend is None else bend
+        yield from self.pieces(low, middle, depth + 1)
+        yield from self.pieces(middle, high, depth + 1)
+
+    def map(self, pieces: Sequence[Piece], end: float) -> Map:
+        """Return pieces that follow each other as a map whose last one holds until an x."""
+        edges = np.array([piece.low for piece in pieces] + [end])
+        return Map(edges, tuple(piece.coefficients for piece in pieces), self.factored)
+
+    def _piece(self, low: float, high: float) -> Piece:
+        """Return the shortest polynomial within the tolerance, or the longest; NaN without fits."""
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
+        # The upper end, where a target may run out, is the hardest place; the lower may be 0.
+        checks = np.linspace(-1, 1, _CHECKS + 1)[1:]
+        # Rounding must not lead beyond the piece.
+        x = np.minimum(middle + half * np.append(nodes, checks), high)
+        fitted = self.fitted(x)
+        if np.isnan(fitted).any():
+            return Piece(low, high, _NO_FIT if np.isnan(fitted).all() else np.zeros(1), np.inf)
+        from numpy.polynomial import chebyshev
+
+        series = chebyshev.chebfit(nodes, self.product(x, fitted)[:_NODES], _NODES - 1)
+        for terms in range(1, _MOST_TERMS + 1):
+            power = chebyshev.cheb2poly(series[:terms])
+            product = Map(np.array([low, high]), (power,), self.factored)(x[_NODES:])
+            approximate = self.variables[1].from_map(x[_NODES:], product)
+            worst = float(np.max(np.abs(approximate / fitted[_NODES:] - 1)))
+            if worst < self.tolerance:
+                break
+        return Piece(low, high, power, worst)
+
+    def _bend(self, low: float, high: float) -> float | None:
+        """Return where the fit jumps or bends in a piece, None if it is smooth."""
+        start = low, high = max(low, _LEAST_X), high
+        for _ in range(_BEND_STEPS):
+            x = np.linspace(low, high, _BEND_POINTS)
+            second = np.abs(np.diff(self.product(x, self.fitted(x)), 2))
+            peak = int(np.argmax(second))
+            if not second[peak] >= _STANDS_OUT * np.median(second):
+                return None
+            low, high = float(x[peak]), float(x[peak + 2])
+        return None if low == start[0] or high == start[1] else 0.5 * (low + high)
+
+
+@cache
+def made_map(source: str, target: str, metric: str) -> Map:
+    """Return the map of a pair under a metric, made from that of the one it is followed from.
+
+    Its errors are below 1e-4; it takes about a second, and is kept. The metric's `from_stored`
+    begins with another one, that has a map of the pair.
+    """
+    from mdfconv.fitting.solve import follow_stored
+
+    task = FitTask(distribution(source), np.empty(0), distribution(target), metric_named(metric))
+    stored = StoredFit(task.source, task.target, task.metric.from_stored()[0])
+    assert stored.map is not None, "asked only for a pair that has a map"
+
+    def fits(parameter: Array) -> Array:
+        return follow_stored(task._replace(parameter=parameter)).fits
+
+    maker = MapMaker(stored.variables, stored.map.factored, fits, _MADE_TOLERANCE, _MADE_NARROWEST)
+    # The lobes' own bends stay where they are, what else there is is found.
+    edges = np.minimum(stored.map.edges, _MADE_END)
+    pieces = [
+        piece if piece.error < _MADE_TOLERANCE else replace(piece, coefficients=_NO_FIT)
+        for low, high in pairwise(edges.tolist())
+        for piece in maker.pieces(low, high)
+    ]
+    return maker.map(pieces, stored.map.edges[-1])

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.quadrature import Quadrature, SmoothQuadrature
+from mdfconv.fitting.quadrature import Breaks, Quadrature, SmoothQuadrature
 
 # Lobes down to 1e-19 are resolved. From there to π/2 there are 67 octaves: so many halvings of the
 # logarithm leave 1e-5, on which D̄ is a straight line even beside an edge, and so many steps of the
@@ -21,21 +21,9 @@ _LEAST, _BISECTIONS, _SECANTS = 1e-20, 22, 4
 def level_crossing(
     distribution: Distribution, parameter: Array, level: Array, high: Array, low: Array
 ) -> Array:
-    """Return the angle at which D̄ crosses a level.
+    """Return the angle between `high` and `low` at which D̄ falls through a level; 0 for none.
 
-    Parameters
-    ----------
-    distribution : Distribution
-        The distribution.
-    parameter, level : numpy.ndarray, shape (n, 1)
-        Its parameters, and levels of D̄.
-    high, low : numpy.ndarray, shape (n, 1)
-        Angles, radians, between which D̄ falls from above the level to below it.
-
-    Returns
-    -------
-    numpy.ndarray, shape (n, 1)
-        The angle; 0 where D̄ does not cross the level between the two.
+    All have the shape (n, 1); at the angle `high` D̄ is above the level, at `low` below it.
     """
     crosses = (level < 1) & (distribution.shape(low, parameter) < level)
     high, low = np.maximum(high, _LEAST), np.maximum(low, _LEAST)
@@ -43,7 +31,7 @@ def level_crossing(
         middle = np.sqrt(low * high)
         above = distribution.shape(middle, parameter) >= level
         high, low = np.where(above, middle, high), np.where(above, low, middle)
-    at_high, at_low = (distribution.shape(end, parameter) - level for end in (high, low))
+    at_high, at_low = (distribution.shape(angle, parameter) - level for angle in (high, low))
     for _ in range(_SECANTS):
         with np.errstate(divide="ignore", invalid="ignore"):
             middle = high + (low - high) * at_high / (at_high - at_low)
@@ -60,35 +48,42 @@ def level_crossing(
     return np.where(crosses, middle, 0)
 
 
-# Angles of kinks, and of the edge.
-_Breaks: TypeAlias = tuple[Array | None, Array | None]
-
 # Beyond this tan β_half (87°), or without a β_half, a lobe is as wide as the hemisphere.
 _WIDEST_TANGENT = 20.0
 
 
+class FitTask(NamedTuple):
+    """What is fitted: a target in the place of each of n lobes of a source.
+
+    The metric says where the distance is sampled, unless there is a quadrature.
+    """
+
+    source: Distribution
+    parameter: Array
+    target: Distribution
+    metric: Metric
+    quadrature: Quadrature | None = None
+
+    def part(self, rows: Indices) -> FitTask:
+        """Return the task for some of the lobes; not for one with a quadrature of its own."""
+        return self._replace(parameter=self.parameter[rows])
+
+    def problem(self, rows: Indices) -> FitProblem:
+        """Return some of the lobes as a batch."""
+        return FitProblem(*self, rows)
+
+    def problem_near(self, near: Array) -> FitProblem:
+        """Return all lobes as a batch whose minima are known to be near: a few angles do."""
+        quadrature = self.quadrature
+        if quadrature is None and self.metric.over_angles:
+            quadrature = SmoothQuadrature(narrowest(self.source, self.parameter, self.target, near))
+        return self._replace(quadrature=quadrature).problem(np.arange(self.parameter.size))
+
+
 class FitProblem:
-    """A batch of fits: the distance of each, and its slope in ln p.
+    """A batch of m fits: the distance of each, and its slope in ln p, p the target's parameter.
 
-    Parameters
-    ----------
-    source : Distribution
-        The distribution that is replaced.
-    parameter : numpy.ndarray, shape (n,)
-        Its legal parameters.
-    target : Distribution
-        What takes its place, with parameters p.
-    metric : Metric
-        What the distance measures.
-    quadrature : Quadrature, optional
-        Where it is sampled; by default as the metric says, over the whole hemisphere.
-    rows : numpy.ndarray of int, shape (m,)
-        Which of the n problems make the batch.
-
-    Attributes
-    ----------
-    tangent : numpy.ndarray, shape (m,)
-        tan β_half of the source, at most that of a lobe as wide as the hemisphere.
+    The first arguments are those of a `FitTask` of n lobes, of which `rows` make the batch.
     """
 
     def __init__(
@@ -103,6 +98,7 @@ class FitProblem:
         self.target, self.metric = target, metric
         self._source = source
         self._source_parameter = parameter[rows][:, None]
+        # tan β_half of the source, at most that of a lobe as wide as the hemisphere.
         self.tangent = bounded_tangent(source, parameter[rows])
         self._peak = source.maximum(self._source_parameter, normalized=metric.normalized)
         if quadrature is None:
@@ -114,12 +110,16 @@ class FitProblem:
         # Unless the panels move with the target, all distances share their samples.
         self._samples: tuple[Array, Array, Array] | None = None
         if not metric.kinks and target.edge(np.ones(1)) is None:
-            self._samples = self._sampled(np.arange(rows.size), *self._source_breaks)
+            self._samples = self._sampled(self._all, self._source_breaks)
 
     @property
     def size(self) -> int:
         """The number of problems in the batch."""
         return self._rows.size
+
+    @property
+    def _all(self) -> Indices:
+        return np.arange(self.size)
 
     def coarse_distance(self, candidates: Array) -> Array:
         """Return the approximate distance for each candidate p, shape (m, c)."""
@@ -138,65 +138,40 @@ class FitProblem:
 
     def distance(self, log_parameter: Array, index: Indices) -> tuple[Array, Array]:
         """Return the distance and half its slope in ln p, for some problems of the batch."""
-        parameter = np.exp(log_parameter)[:, None]
-        beta, weight, signal = self._samples_for(parameter, index)
-        value, slope = self.metric.signal_and_slope(self.target, beta, parameter, self._peak[index])
-        value -= signal
-        weighted = weight * value
-        return np.einsum("ij,ij->i", weighted, value), np.einsum("ij,ij->i", weighted, slope)
+        weight, residual, slope = self._residual_and_slope(log_parameter, index)
+        weighted = weight * residual
+        return np.einsum("ij,ij->i", weighted, residual), np.einsum("ij,ij->i", weighted, slope)
 
     def step(self, log_parameter: Array) -> tuple[Array, Array]:
-        """Return the Gauss-Newton step in ln p from near a minimum, and the distance there.
-
-        Parameters
-        ----------
-        log_parameter : numpy.ndarray, shape (m,)
-            Those of the target.
-        """
-        parameter = np.exp(log_parameter)[:, None]
-        beta, weight, signal = self._samples_for(parameter, np.arange(self.size))
-        value, slope = self.metric.signal_and_slope(self.target, beta, parameter, self._peak)
-        value -= signal
+        """Return the Gauss-Newton step in ln p from near a minimum, and the distance there."""
+        weight, residual, slope = self._residual_and_slope(log_parameter, self._all)
         weighted = weight * slope
         curvature = np.einsum("ij,ij->i", weighted, slope)
-        step = -np.einsum("ij,ij->i", weighted, value) / curvature
+        step = -np.einsum("ij,ij->i", weighted, residual) / curvature
         # The distance at the end of the step, to second order.
-        distance = np.einsum("ij,ij,ij->i", weight, value, value) - np.square(step) * curvature
-        return step, distance
+        distance = np.einsum("ij,ij,ij->i", weight, residual, residual)
+        return step, distance - np.square(step) * curvature
 
     def residual(self, parameter: Array) -> Callable[[Distribution, Array], Array]:
         """Return √w ΔS, shape (m, k), as a function of a target and its parameters.
 
-        Parameters
-        ----------
-        parameter : numpy.ndarray, shape (m,)
-            Those of the target for which the samples are placed; there they stay.
+        The samples are those for the target with `parameter`, shape (m,).
         """
-        beta, weight, signal = self._samples_for(parameter[:, None], np.arange(self.size))
+        beta, weight, signal = self._samples_for(parameter[:, None], self._all)
         root = np.sqrt(weight)
 
         def residual(target: Distribution, parameter: Array) -> Array:
             value = self.metric.signal(target, beta, parameter[:, None], self._peak)
-            difference: Array = root * (value - signal)
-            return difference
+            return root * (value - signal)
 
         return residual
 
     def relative_error(self, parameter: Array) -> tuple[Array, Array]:
         """Return √(distance / distance of the source from 0), and max |ΔS| / max |S|.
 
-        Parameters
-        ----------
-        parameter : numpy.ndarray, shape (m,)
-            Those of the target.
-
-        Returns
-        -------
-        root_mean_square, maximum : numpy.ndarray, shape (m,)
-            Infinite where the source has no signal, as a uniform lobe has no contrast.
+        Infinite where the source has no signal, as a uniform lobe has no contrast.
         """
-        index = np.arange(self.size)
-        beta, weight, signal = self._samples_for(parameter[:, None], index)
+        beta, weight, signal = self._samples_for(parameter[:, None], self._all)
         difference = self.metric.signal(self.target, beta, parameter[:, None], self._peak)
         difference -= signal
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -207,6 +182,16 @@ class FitProblem:
             largest = np.max(np.abs(difference), axis=1) / np.max(np.abs(signal), axis=1)
         return share, largest
 
+    def _residual_and_slope(
+        self, log_parameter: Array, index: Indices
+    ) -> tuple[Array, Array, Array]:
+        """Return the weights, ΔS and ∂S/∂ ln p of some problems at their samples."""
+        parameter = np.exp(log_parameter)[:, None]
+        beta, weight, signal = self._samples_for(parameter, index)
+        value, slope = self.metric.signal_and_slope(self.target, beta, parameter, self._peak[index])
+        value -= signal
+        return weight, value, slope
+
     def _samples_for(self, parameter: Array, index: Indices) -> tuple[Array, Array, Array]:
         """Return angles, weights and the source's signal for parameters of the target."""
         if self._samples is not None:
@@ -214,58 +199,31 @@ class FitProblem:
                 return self._samples
             beta, weight, signal = (array[index] for array in self._samples)
             return beta, weight, signal
-        theirs = (part if part is None else part[index] for part in self._source_breaks)
-        ours = self._breaks(self.target, parameter, self._peak[index])
-        return self._sampled(index, *map(_joined, theirs, ours))
+        breaks = self._breaks(self.target, parameter, self._peak[index])
+        return self._sampled(index, self._source_breaks.rows(index).joined(breaks))
 
-    def _sampled(
-        self, index: Indices, kinks: Array | None, edges: Array | None
-    ) -> tuple[Array, Array, Array]:
+    def _sampled(self, index: Indices, breaks: Breaks) -> tuple[Array, Array, Array]:
         """Return angles, weights and the source's signal."""
-        beta, weight = self._quadrature.nodes(self._rows[index], kinks, edges)
+        beta, weight = self._quadrature.nodes(self._rows[index], breaks)
         parameter = self._source_parameter[index]
         signal = self.metric.signal(self._source, beta, parameter, self._peak[index])
         return beta, weight * self.metric.weight(beta), signal
 
-    def _breaks(self, distribution: Distribution, parameter: Array, peak: Array) -> _Breaks:
-        """Return the angles of kinks and of the edge, shapes (n, any); None for neither."""
+    def _breaks(self, distribution: Distribution, parameter: Array, peak: Array) -> Breaks:
+        """Return where the signal of a lobe has kinks, and where it becomes 0."""
+        edge = distribution.edge(parameter)
+        if not self.metric.kinks:
+            return Breaks(edges=edge)
         kinks = []
         maximum = distribution.maximum(parameter, normalized=self.metric.normalized)
         mode = distribution.mode(parameter)
+        sides = [np.full_like(mode, 0.5 * np.pi)]
+        if np.any(mode > 0):
+            sides.append(np.zeros_like(mode))
         for kink in self.metric.kinks:
             level = kink * peak / maximum
-            ends = [(mode, np.full_like(mode, 0.5 * np.pi))]
-            if np.any(mode > 0):
-                ends.append((mode, np.zeros_like(mode)))
-            kinks += [level_crossing(distribution, parameter, level, *end) for end in ends]
-        return np.concatenate(kinks, axis=1) if kinks else None, distribution.edge(parameter)
-
-
-def _joined(one: Array | None, other: Array | None) -> Array | None:
-    parts = [part for part in (one, other) if part is not None]
-    return np.concatenate(parts, axis=1) if parts else None
-
-
-def near_problem(
-    source: Distribution,
-    parameter: Array,
-    target: Distribution,
-    near: Array,
-    metric: Metric,
-    quadrature: Quadrature | None = None,
-) -> FitProblem:
-    """Return a batch of n fits whose answers are known to be near: a few angles are enough.
-
-    Parameters
-    ----------
-    near : numpy.ndarray, shape (n,)
-        Parameters of the target near the answers.
-    source, parameter, target, metric, quadrature
-        As for `Problem`.
-    """
-    if quadrature is None and metric.over_angles:
-        quadrature = SmoothQuadrature(narrowest(source, parameter, target, near))
-    return FitProblem(source, parameter, target, metric, quadrature, np.arange(parameter.size))
+            kinks += [level_crossing(distribution, parameter, level, mode, low) for low in sides]
+        return Breaks(np.concatenate(kinks, axis=1), edge)
 
 
 def narrowest(source: Distribution, parameter: Array, target: Distribution, result: Array) -> Array:

@@ -106,7 +106,7 @@ class Scene:
 
 
 @dataclass(frozen=True)
-class ConversionRule:
+class PictureRule:
     """A row of the contact sheet: how the parameters are converted, with the metric of a fit."""
 
     method: str
@@ -120,12 +120,12 @@ class ConversionRule:
         return f"{self.method} ({_WORDS[self.method]})" if self.method in _WORDS else self.method
 
 
-def default_rules(exposure: float) -> list[ConversionRule]:
+def default_rules(exposure: float) -> list[PictureRule]:
     """Return the paper's conversion (shape), and the fits that keep the light and the picture."""
     return [
-        ConversionRule("closed-form", metric_named("unit")),
-        ConversionRule("fit", metric_named("energy")),
-        ConversionRule("fit", metric_named(f"display:{exposure}")),
+        PictureRule("closed-form", metric_named("unit")),
+        PictureRule("fit", metric_named("energy")),
+        PictureRule("fit", metric_named(f"display:{exposure}")),
     ]
 
 
@@ -242,7 +242,7 @@ class _Surface:
     def lobe(self) -> tuple[Distribution, float]:
         return self.end.distribution, self.end.decode_one(self.value)
 
-    def converted(self, end: Endpoint, rule: ConversionRule) -> _Surface:
+    def converted(self, end: Endpoint, rule: PictureRule) -> _Surface:
         """Return the surface with another distribution."""
         value = convert(self.value, self.end, end, rule.method, metric=rule.metric)
         return _Surface(end, float(value))
@@ -250,7 +250,7 @@ class _Surface:
 
 def compare(
     value: float,
-    rules: Sequence[ConversionRule],
+    rules: Sequence[PictureRule],
     scene: Scene,
     source: str | Endpoint = REFERENCE,
     targets: Sequence[str | Endpoint] = DRAWN,
@@ -261,7 +261,7 @@ def compare(
     ----------
     value : float
         The parameter of the surface, in the form in which the source stores it.
-    rules : sequence of ConversionRule
+    rules : sequence of PictureRule
         How it is converted.
     scene : Scene
         What is rendered.

@@ -26,7 +26,7 @@ from mdfconv.distributions.evaluation import Array, gauss_panels
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.fitting.metrics.base import srgb
-from mdfconv.light.lobe_spectrum import LobeSpectrum
+from mdfconv.light.spectrum import LobeSpectrum
 from mdfconv.output.files import file_bytes
 from mdfconv.render.comparison import Scene
 from mdfconv.render.comparison_figure import BACKGROUND

@@ -1,15 +1,28 @@
-"""Scene files: material libraries and roughness textures."""
+"""Scene files: libraries and files of materials, and textures of their roughness."""
 
-from mdfconv.scene.gltf.asset import convert_gltf
-from mdfconv.scene.gltf.images import GltfTextures
-from mdfconv.scene.mitsuba.convert import convert_mitsuba
-from mdfconv.scene.mtl.library import convert_mtl
-from mdfconv.scene.texture.convert import convert_texture, convert_texture_file
-from mdfconv.scene.texture.rule import TextureRule
-from mdfconv.scene.texture.texel_map import TextureReport
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mdfconv.scene.gltf.asset import GltfConversion, GltfMaterial, convert_gltf
+    from mdfconv.scene.gltf.images import GltfTextures
+    from mdfconv.scene.mitsuba.convert import MitsubaConversion, MitsubaMaterial, convert_mitsuba
+    from mdfconv.scene.mtl.library import MtlConversion, MtlMaterial, convert_mtl
+    from mdfconv.scene.stored import MaterialProblem, ProblemKind
+    from mdfconv.scene.texture.convert import convert_texture, convert_texture_file
+    from mdfconv.scene.texture.rule import TextureRule
+    from mdfconv.scene.texture.texel_map import TextureReport
 
 __all__ = [
+    "GltfConversion",
+    "GltfMaterial",
     "GltfTextures",
+    "MaterialProblem",
+    "MitsubaConversion",
+    "MitsubaMaterial",
+    "MtlConversion",
+    "MtlMaterial",
+    "ProblemKind",
     "TextureReport",
     "TextureRule",
     "convert_gltf",
@@ -18,3 +31,29 @@ __all__ = [
     "convert_texture",
     "convert_texture_file",
 ]
+
+# Imported when they are asked for: a command for one of the files needs nothing of the others.
+_MODULES = {
+    "gltf.asset": ("GltfConversion", "GltfMaterial", "convert_gltf"),
+    "gltf.images": ("GltfTextures",),
+    "mitsuba.convert": ("MitsubaConversion", "MitsubaMaterial", "convert_mitsuba"),
+    "mtl.library": ("MtlConversion", "MtlMaterial", "convert_mtl"),
+    "stored": ("MaterialProblem", "ProblemKind"),
+    "texture.convert": ("convert_texture", "convert_texture_file"),
+    "texture.rule": ("TextureRule",),
+    "texture.texel_map": ("TextureReport",),
+}
+_HOMES = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what was asked for by its name."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return the public names, whether they are imported yet or not."""
+    return sorted({*globals(), *_HOMES})

@@ -6,9 +6,13 @@ import os
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from mdfconv.errors import MdfconvError
 from mdfconv.output.files import write_files
+from mdfconv.scene.stored import MaterialProblem
+from mdfconv.scene.texture.convert import convert_texture_bytes
+from mdfconv.scene.texture.rule import TextureRule
 
 
 @dataclass(frozen=True)
@@ -89,6 +93,47 @@ def _free_backup(file: Path) -> Path:
     return backup
 
 
+class TextureFolder:
+    """Textures that a file of materials names, converted to stand beside its conversion.
+
+    Parameters
+    ----------
+    source, output : Path
+        The file, from whose folder it names them, and its conversion.
+    """
+
+    def __init__(self, source: Path, output: Path) -> None:
+        self._source, self._output = source.parent, output.parent
+        self._converted: dict[tuple[Path, TextureRule], Path] = {}
+        # The new files.
+        self.files: dict[Path, bytes] = {}
+
+    def convert(self, file: str, rule: TextureRule, suffix: str) -> str:
+        """Return the name of a converted texture: for ``wood.png`` it is ``wood_Pr.png``.
+
+        Of another file of that name it is ``wood_Pr_2.png``.
+
+        Raises
+        ------
+        MdfconvError
+            If it cannot be read or converted.
+        """
+        # Files from Windows separate folders by backslashes.
+        source = self._source / file.replace("\\", "/")
+        if (source, rule) not in self._converted:
+            stem = f"{source.stem}_{suffix}"
+            output = free_name(self._output, stem, source.suffix, self.files)
+            content, _ = convert_texture_bytes(read_file(source), source.suffix, rule)
+            self.files[output] = content
+            self._converted[source, rule] = output
+        return self._converted[source, rule].name
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The textures that were converted."""
+        return tuple(source for source, _ in self._converted)
+
+
 @dataclass(frozen=True, kw_only=True)
 class FileConversion:
     """A converted file of materials.
@@ -97,9 +142,10 @@ class FileConversion:
     ----------
     data : bytes
         Its bytes.
-    problems : tuple of (int or str, str)
-        What is left as it is: where it stands, a line or a path within the file, and what is
-        wrong with it.
+    materials : sequence
+        What was converted: records with ``notes``, and fields of their own.
+    problems : tuple of MaterialProblem
+        What is left as it is.
     notes : tuple of (int, str)
         What a careful user must know, and the line that it is about.
     files : mapping of Path to bytes
@@ -111,7 +157,8 @@ class FileConversion:
     """
 
     data: bytes
-    problems: tuple[tuple[int | str, str], ...] = ()
+    materials: Sequence[Any]
+    problems: tuple[MaterialProblem, ...] = ()
     notes: tuple[tuple[int, str], ...] = ()
     files: Mapping[Path, bytes] = field(default_factory=dict)
     inputs: Sequence[Path] = ()

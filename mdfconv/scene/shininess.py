@@ -1,47 +1,41 @@
-"""Wavefront's exponent Ns and the roughness of physically based renderers, both ways.
+"""Wavefront's exponent Ns and the roughness of physically based renderers: by fit, and by rules.
 
 Ns is Blinn/Phong's exponent, Pr the roughness of GGX with α = Pr². Ns 0 is the uniform lobe, which
-GGX has at Pr 1; Pr 0 is a mirror, which no exponent reaches.
+GGX has at Pr 1; Pr 0 is a mirror, which no exponent reaches. Importers turn exponents into
+roughness by rules of their own: what they make of one, and what that costs, stands here too.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from mdfconv.conversion import convert
-from mdfconv.conversion.explanation import remaining_error
-from mdfconv.distributions.dialects import DIALECTS
-from mdfconv.distributions.endpoint import endpoints
+from mdfconv.distributions import list_distributions
+from mdfconv.distributions.dialects import DIALECTS, Specular
+from mdfconv.distributions.endpoint import endpoints, stored_forms
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.solve import errors_of_many
+from mdfconv.scene.stored import UNIFORM_BELOW, StoredConverter
 
 SHININESS, ROUGHNESS = "blinn-phong", "ggx:roughness"
-# Pr at these is 1 − 2e-7 and 4e-5: no library means anything beyond.
-_LEAST, _MOST = 1e-6, 1e18
+# Its Pr is 4e-5: no library means anything beyond.
+_LARGEST_EXPONENT = 1e18
 
 
 def roughness_of(exponent: Array, metric: Metric) -> Array:
-    """Return the roughness of the GGX that fits Blinn/Phong best.
-
-    Parameters
-    ----------
-    exponent : numpy.ndarray, shape (n,)
-        Ns ≥ 0.
-    metric : Metric
-        What the fit keeps.
-
-    Returns
-    -------
-    numpy.ndarray, shape (n,)
-        Pr from 0 to 1; 1 for Ns 0, which is uniform.
-    """
+    """Return the Pr, from 0 to 1, that fits each Ns ≥ 0 best, shape (n,); 1 for Ns 0."""
     roughness = np.ones_like(exponent)
-    lobes = exponent >= _LEAST
+    lobes = exponent >= UNIFORM_BELOW
+    # With the cautions of a conversion.
     roughness[lobes] = convert(exponent[lobes], SHININESS, ROUGHNESS, metric=metric)
     return roughness
+
+
+def _converter(metric: Metric) -> StoredConverter:
+    return StoredConverter(*endpoints(SHININESS, ROUGHNESS), metric)
 
 
 def exponent_of(roughness: Array, metric: Metric) -> Array:
@@ -50,27 +44,26 @@ def exponent_of(roughness: Array, metric: Metric) -> Array:
     Parameters
     ----------
     roughness : numpy.ndarray, shape (n,)
-        0 < Pr ≤ 1.
+        Pr from 0 to 1.
     metric : Metric
         What the fit keeps.
 
     Returns
     -------
     numpy.ndarray, shape (n,)
-        Ns, 0 for Pr 1 and otherwise from 1e-6 to 1e18.
+        Ns, 0 for Pr 1, NaN for a mirror and otherwise from 1e-6 to 1e18.
     """
     from scipy.optimize import elementwise
 
     def difference(log_exponent: Array, roughness: Array) -> Array:
         return roughness_of(np.exp(log_exponent), metric) - roughness
 
-    ends = np.log([_LEAST, _MOST])
-    roughest, smoothest = roughness_of(np.exp(ends), metric)
-    bracket = tuple(np.full(roughness.shape, end) for end in ends)
-    root = elementwise.find_root(
-        difference, bracket, args=(np.clip(roughness, smoothest, roughest),)
-    )
-    return np.where(roughness < 1, np.exp(root.x), 0.0)
+    limits = np.log([UNIFORM_BELOW, _LARGEST_EXPONENT])
+    roughest, smoothest = roughness_of(np.exp(limits), metric)
+    bracket = tuple(np.full(roughness.shape, limit) for limit in limits)
+    reachable = np.clip(roughness, smoothest, roughest)
+    root = elementwise.find_root(difference, bracket, args=(reachable,))
+    return np.select([roughness == 0, roughness < 1], [np.nan, np.exp(root.x)], 0.0)
 
 
 def error_of(exponent: Array, roughness: Array, metric: Metric) -> Array:
@@ -88,29 +81,20 @@ def error_of(exponent: Array, roughness: Array, metric: Metric) -> Array:
     numpy.ndarray, shape (n,)
         The relative root mean square of `remaining_error`; infinite for a mirror (Pr 0).
     """
-    source, target = endpoints(SHININESS, ROUGHNESS)
-    lobes = roughness > 0
-    rmse = np.full_like(roughness, np.inf)
-    rmse[lobes], _ = remaining_error(
-        source.distribution,
-        np.maximum(exponent[lobes], _LEAST),
-        target.distribution,
-        target.decode(roughness[lobes]),
-        metric,
-    )
+    rmse = _converter(metric).remaining(np.maximum(exponent, UNIFORM_BELOW), roughness)
+    rmse[roughness == 0] = np.inf
     # Both are the uniform lobe, whose signal may be nothing that an error is relative to.
-    rmse[(exponent < _LEAST) & (roughness == 1)] = 0.0
+    rmse[(exponent < UNIFORM_BELOW) & (roughness == 1)] = 0.0
     return rmse
 
 
 def fit_error(exponent: Array, metric: Metric) -> Array:
-    """Return `error_of` the roughness that fits best, shape (n,); of many to 1e-4."""
-
-    def error(exponent: Array) -> Array:
-        return error_of(exponent, roughness_of(exponent, metric), metric)
-
-    errors = errors_of_many(error, np.maximum(exponent, _LEAST))
-    return np.where(exponent < _LEAST, 0.0, errors)
+    """Return `error_of` the roughness that fits best, shape (n,), of many to 1e-4; NaN for NaN."""
+    rmse = np.full_like(exponent, np.nan)
+    known = ~np.isnan(exponent)
+    rmse[known] = _converter(metric).errors(np.maximum(exponent[known], UNIFORM_BELOW))
+    rmse[exponent < UNIFORM_BELOW] = 0.0
+    return rmse
 
 
 # The programs that store a roughness for an exponent, and render it with GGX.
@@ -160,3 +144,51 @@ def importer_results(exponent: Array, metric: Metric) -> list[tuple[ImporterResu
         pairs = zip(roughness.tolist(), rmse.tolist(), strict=True)
         by_rule.append([ImporterResult(importer, *pair) for pair in pairs])
     return list(zip(*by_rule, strict=True))
+
+
+# Where the error of a rule for exponents is given.
+EXPONENTS = (10, 100, 1000)
+
+
+def encoding_records(metric: Metric) -> list[dict[str, Any]]:
+    """Return every encoding and dialect, with the error that its rule leaves.
+
+    Parameters
+    ----------
+    metric : Metric
+        Under which the error is taken.
+
+    Returns
+    -------
+    list of dict
+        ``encoding`` as in ``"blinn-phong:fbx"``, its ``formula``, the legal ``range`` of the
+        stored number, what is ``clamped``, the ``programs``, where their ``source`` is, a
+        ``note``, ``specular`` ("no", "optional" or "needed"), and of what stores a roughness for
+        an exponent ``roughness_100`` and ``rmse_100``, and so on for each of `EXPONENTS`: of GGX
+        in Blinn/Phong's place, with a specular weight of 1; infinite for a mirror.
+    """
+    costs = [f"{what}_{n}" for n in EXPONENTS for what in ("roughness", "rmse")]
+    by_importer: dict[str, dict[str, float]] = {importer: {} for importer in IMPORTERS}
+    for n, results in zip(
+        EXPONENTS, importer_results(np.array(EXPONENTS, float), metric), strict=True
+    ):
+        for result in results:
+            cost = {f"roughness_{n}": result.roughness, f"rmse_{n}": result.rmse}
+            by_importer[result.importer] |= cost
+    records = []
+    for owner in list_distributions():
+        for end, dialect in stored_forms(owner):
+            assert end.encoding is not None, "it is a stored form"
+            name = dialect.name if dialect else end.encoding.name
+            record = {
+                "encoding": f"{owner.name}:{name}",
+                "formula": end.encoding.formula,
+                "range": end.stored.legal,
+                "clamped": "; ".join(end.clamped(np.empty(0))),
+                "programs": dialect.program if dialect else "",
+                "source": dialect.source if dialect else "",
+                "note": dialect.note if dialect else "",
+                "specular": (dialect.specular if dialect else Specular.no).value,
+            }
+            records.append(record | dict.fromkeys(costs) | by_importer.get(name, {}))
+    return records

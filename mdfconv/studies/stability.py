@@ -21,8 +21,7 @@ import numpy as np
 from mdfconv.conversion import convert, list_methods
 from mdfconv.conversion.methods import FormulaMethod, Method
 from mdfconv.distributions import Distribution, distribution, list_distributions
-from mdfconv.distributions.endpoint import Endpoint
-from mdfconv.distributions.equivalence import exact_route
+from mdfconv.distributions.endpoint import Endpoint, exact_route
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvWarning
 from mdfconv.fitting.metrics import metric_named

@@ -8,7 +8,7 @@ import pytest
 import mdfconv
 from mdfconv.conversion.explanation import remaining_error
 from mdfconv.distributions import one_parameter_distributions
-from mdfconv.distributions.equivalence import exact_route
+from mdfconv.distributions.endpoint import exact_route
 from mdfconv.fitting.metrics import list_metrics, metric_named
 from mdfconv.recommend import answers, covering
 from tests.fitting.brute_force import Problem

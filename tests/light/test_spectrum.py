@@ -9,8 +9,7 @@ from mdfconv.distributions import one_parameter_distributions
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.fitting.metrics.light import LightMetric
 from mdfconv.fitting.solve import fit
-from mdfconv.light.lobe_spectrum import LobeSpectrum
-from mdfconv.light.spectrum import Spectrum, spectrum_of
+from mdfconv.light import LobeSpectrum, Spectrum, spectrum_of
 from tests.light.maps import directions, room
 
 NAMES = [mdf.name for mdf in one_parameter_distributions()]

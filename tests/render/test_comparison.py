@@ -17,7 +17,7 @@ from mdfconv.fitting.metrics import metric_named
 from mdfconv.render.comparison import (
     DRAWN,
     PAPER_FIGURES,
-    ConversionRule,
+    PictureRule,
     Scene,
     compare,
     default_rules,
@@ -146,8 +146,8 @@ def test_the_rows_say_what_they_keep():
         "closed-form (shape)", "fit energy (light)", "fit display (picture)",
     ]  # fmt: skip
     assert str(default_rules(4.0)[-1].metric) == "display:4"
-    assert ConversionRule("half-angle", metric_named("unit")).label == "half-angle"
-    assert ConversionRule("fit", metric_named("unit")).label == "fit unit (shape)"
+    assert PictureRule("half-angle", metric_named("unit")).label == "half-angle"
+    assert PictureRule("fit", metric_named("unit")).label == "fit unit (shape)"
 
 
 def test_the_papers_pictures_come_back():
@@ -254,7 +254,7 @@ def test_any_form_is_compared_with_any(name):
     value = float(end.encode(np.array(endpoint("beckmann").distribution.parameter.typical_value)))
     if end.distribution.parameter.larger_is_smoother:
         value = float(end.encode(np.array(50.0)))
-    rules = [ConversionRule("fit", metric_named("energy"))]
+    rules = [PictureRule("fit", metric_named("energy"))]
     scene = Scene(size=64)
     from_it = compare(value, rules, scene, name, ["beckmann", "ggx:roughness"])
     assert (from_it.reference.name, from_it.reference.value) == (end.label, value)
@@ -280,9 +280,7 @@ def test_no_text_is_cut_off_or_lies_on_another(targets, name, monkeypatch):
         (d.name for d in DIALECTS if "blinn-phong" in d.owners and d.specular is Specular.no),
         key=len,
     )
-    rules = [
-        ConversionRule("fit", metric_named(kept)) for kept in ("energy", "display:2.25", "unit")
-    ]
+    rules = [PictureRule("fit", metric_named(kept)) for kept in ("energy", "display:2.25", "unit")]
     ends = [longest, "ggx:roughness", "gauss", "schlick", "sawicki", "ggx", "beckmann", "gtr"]
     scene = Scene(size=200, material="polycarbonate", brdf="smoothie-approx")
     value = float(endpoint(longest).encode(np.array(90.0 if name == "whole" else 400.0)))

@@ -15,8 +15,8 @@ import mdfconv
 from mdfconv.distributions import distribution
 from mdfconv.distributions.endpoint import endpoint
 from mdfconv.fitting.metrics import list_metrics, metric_named
-from mdfconv.light.lobe_spectrum import LobeSpectrum
-from mdfconv.render.comparison import ConversionRule, Scene, compare
+from mdfconv.light.spectrum import LobeSpectrum
+from mdfconv.render.comparison import PictureRule, Scene, compare
 from mdfconv.render.comparison_figure import BACKGROUND, displayed_pixels
 from mdfconv.render.page import comparison_page, filled, page_data
 from mdfconv.render.sphere import Frame
@@ -242,7 +242,7 @@ def test_halves_are_the_pictures_of_compare(number, light, m_b, tmp_path):
     page = built("beckmann", "ggx")
     ours, _ = opened(tmp_path, page, show(number, m_b))
     ours = np.reshape(ours, (SIZE, SIZE))
-    rule = ConversionRule("fit", metric_named("environment"))
+    rule = PictureRule("fit", metric_named("environment"))
     pictures = compare(m_b, [rule], Scene(light=light, size=SIZE), targets=["ggx"])
     background = (1 - Frame(SIZE).normals()[1].reshape(SIZE, SIZE)) * BACKGROUND
     source, target = (

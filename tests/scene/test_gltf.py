@@ -18,7 +18,9 @@ import mdfconv
 from mdfconv.errors import MdfconvError
 from mdfconv.scene import GltfTextures, convert_gltf
 from mdfconv.scene.gltf.asset import dialects_by_generator, generator_of
+from mdfconv.scene.stored import ProblemKind
 from tests.cli.runner import run, run_on_terminal
+from tests.scene.pictures import write_png
 
 pygltflib = pytest.importorskip("pygltflib")
 
@@ -192,7 +194,7 @@ def test_an_absent_factor_that_stays_1_is_not_written():
 def test_what_has_no_answer_is_left(source, value, problem):
     data = text_of(factor(value), factor(0.3))
     found = convert_gltf(data, source)
-    ((place, text),) = found.problems
+    ((place, text, _),) = found.problems
     assert place == "materials[0]"
     assert problem in text
     assert "\n" not in text
@@ -205,7 +207,7 @@ def test_what_has_no_answer_is_left(source, value, problem):
 def test_what_is_no_material_is_left(material):
     data = text_of(material, factor(0.9))
     found = convert_gltf(data, OBJ2GLTF)
-    assert [place for place, _ in found.problems] == ["materials[0]"]
+    assert [place for place, _, _ in found.problems] == ["materials[0]"]
     assert found.data == data.replace(b"0.9", b"0.33148781")
 
 
@@ -390,7 +392,7 @@ def content_of(image):
 def test_textures_need_to_be_asked_for():
     data = text_of(textured(0, 0.5), textures=[{"source": 0}], images=[{"uri": "a.png"}])
     found = convert_gltf(data, OBJ2GLTF)
-    assert found.problems == (("materials[0]", "has a roughness texture"),)
+    assert found.problems == (("materials[0]", "has a roughness texture", ProblemKind.TEXTURE),)
     assert found.data == data
 
 
@@ -413,6 +415,26 @@ def test_a_texture_in_a_file(tmp_path):
     assert found.data == data.replace(b"maps/wood%201.png", b"wood_1_ggx-roughness.png")
     assert [entry.notes for entry in found.materials] == [("with the texture of images[0]",)] * 2
     assert found.inputs == (source / "maps" / "wood 1.png",)
+
+
+def test_a_note_on_a_texture_has_no_path_of_a_temporary_file(tmp_path):
+    texels = np.full((4, 4, 3), 99, np.uint8)
+    gamma = b"gAMA", (45455).to_bytes(4)
+    content = write_png(tmp_path / "a.png", texels, more=[gamma]).read_bytes()
+    data = text_of(textured(0), textures=[{"source": 0}], images=[{"uri": data_uri(content)}])
+    found = convert_gltf(data, OBJ2GLTF, textures=GltfTextures(tmp_path, tmp_path))
+    assert found.materials[0].notes == (
+        "with the texture of images[0]",
+        "the texture has a gamma of 2.2, which is not for data: its texels were taken as they are",
+    )
+
+
+def test_what_is_no_factor_is_refused_without_a_word_of_the_command_line():
+    for argument, pair in (("source", ("blinn-phong",)), ("target", ("ggx", "blinn-phong"))):
+        with pytest.raises(MdfconvError, match="at most 1, blinn-phong is more") as caught:
+            convert_gltf(text_of(), *pair)
+        assert "--" not in str(caught.value)
+        assert caught.value.argument == argument
 
 
 def test_textures_with_factors_and_other_uses(tmp_path):
@@ -548,7 +570,7 @@ def test_textures_that_are_left(image, texture, text, tmp_path):
         buffers=[{"byteLength": 3, "uri": "data:;base64,YWJj"}, {"byteLength": 3}],
     )
     found = convert_gltf(data, OBJ2GLTF, textures=GltfTextures(tmp_path, tmp_path))
-    ((place, problem),) = found.problems
+    ((place, problem, _),) = found.problems
     assert place == "materials[0]"
     assert text in problem
     assert (found.data, found.files, found.materials) == (data, {}, ())

@@ -276,7 +276,7 @@ def test_shared_parameters_are_left(other):
 def test_what_cannot_be_converted_is_left(bsdf, message):
     data = scene("\n", bsdf, rough(number(0.2)), version="0.6.0")
     found = convert_mitsuba(data)
-    ((line, problem),) = found.problems
+    ((line, problem, _),) = found.problems
     assert line == 3
     assert message in problem
     assert bsdf.encode() in found.data
@@ -285,7 +285,7 @@ def test_what_cannot_be_converted_is_left(bsdf, message):
 
 def test_phong_is_of_the_older_version():
     data = scene(rough(text("phong")), version="3.5.0")
-    ((_, problem),) = convert_mitsuba(data).problems
+    ((_, problem, _),) = convert_mitsuba(data).problems
     assert problem == "distribution 'phong' is one of Mitsuba 0.6, not of 3"
 
 

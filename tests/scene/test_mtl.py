@@ -24,6 +24,7 @@ from mdfconv.scene.shininess import (
     importer_results,
     roughness_of,
 )
+from mdfconv.scene.stored import ProblemKind
 from tests.cli.runner import run, run_on_terminal
 
 DATA = Path(__file__).parent / "data"
@@ -138,7 +139,7 @@ def test_what_is_not_a_number_is_reported_and_left(statement, text):
     data = b"newmtl a\n" + statement + b"\n"
     found = convert_mtl(data)
     assert found.data == data
-    assert found.problems == ((2, text),)
+    assert found.problems == ((2, text, ProblemKind.OTHER),)
     assert not found.materials
 
 
@@ -152,7 +153,7 @@ def test_ends_of_the_range():
     assert tiny.roughness == 1.0
     back = convert_mtl(b"newmtl a\nPr 0\nnewmtl b\nPr 1\nnewmtl c\nPr 1.5\n", "shininess")
     assert back.data == b"newmtl a\nPr 0\nnewmtl b\nPr 1\nNs 0\nnewmtl c\nPr 1.5\n"
-    assert back.problems == ((6, "Pr '1.5' is outside 0 ≤ Pr ≤ 1"),)
+    assert back.problems == ((6, "Pr '1.5' is outside 0 ≤ Pr ≤ 1", ProblemKind.OTHER),)
 
 
 @settings(deadline=None)

@@ -22,6 +22,11 @@ _REGISTRY: Registry[type[Metric]] = Registry("metric")
 def register_metric(kind: type[Metric]) -> None:
     """Add a metric: every function and command that takes one knows it from here on.
 
+    Parameters
+    ----------
+    kind : type
+        A subclass of `mdfconv.fitting.metrics.Metric`.
+
     Raises
     ------
     MdfconvError

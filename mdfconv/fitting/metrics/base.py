@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import ClassVar, Self
 
@@ -17,11 +17,8 @@ from mdfconv.distributions.parameter import Parameter, number_text, percent_hint
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.quadrature import LobeQuadrature, Quadrature
 
-
-def scaled(parameter: Array, ratio: float, target: Distribution) -> Array:
-    """Return the fits of a pair that has a `Metric.ratio`, within the target's legal range."""
-    limited: Array = np.minimum(parameter * ratio, target.parameter.upper)
-    return limited
+# From 1e-20 to 1e-30 a signal with a slope falls to 1e-10 of itself, a root to more.
+_STEEP_SHARE = 2e-10
 
 
 class Metric(ABC):
@@ -93,7 +90,14 @@ class Metric(ABC):
 
     def quadrature(self, half_width: Array) -> Quadrature:
         """Return where S is sampled, for lobes of which β_half is the narrowest, radians."""
-        return LobeQuadrature(half_width)
+        return LobeQuadrature(half_width, steep=self.steep)
+
+    @cached_property
+    def steep(self) -> bool:
+        """Whether S has an infinite slope where D leaves 0, as a root has."""
+        with np.errstate(all="ignore"):
+            zero, near, farther = self.encode(np.array([0, 1e-30, 1e-20]))
+            return bool(near - zero > _STEEP_SHARE * (farther - zero))
 
     def ratio(self, source: Distribution, target: Distribution) -> float | None:
         """Return p_target/p_source of the fit where that is one constant, else None."""

@@ -12,9 +12,8 @@ from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics.base import Metric
-from mdfconv.fitting.quadrature import Quadrature
-from mdfconv.light.lobe_spectrum import LobeSpectrum
-from mdfconv.light.spectrum import Spectrum, spectrum_of_file
+from mdfconv.fitting.quadrature import NO_BREAKS, Breaks, Quadrature, Samples
+from mdfconv.light.spectrum import LobeSpectrum, Spectrum, spectrum_of_file
 
 
 class LightMetric(Metric):
@@ -22,14 +21,7 @@ class LightMetric(Metric):
 
     A lobe blurs the environment, which multiplies degree l by k_l; C_l is the angular power of
     the map's luminance, beyond its resolution continued by its power law. The sum takes the place
-    of the integral over β: S is k_l, and a sample is a degree.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-        C_l.
-    label : str
-        What names the light: the path of its map.
+    of the integral over β: S is k_l, and a sample is a degree. The label is the path of the map.
     """
 
     name = "light"
@@ -95,13 +87,11 @@ class _Degrees:
     def __init__(self, degree: Array) -> None:
         self._degree = degree
 
-    def nodes(
-        self, rows: Indices, kinks: Array | None = None, edges: Array | None = None
-    ) -> tuple[Array, Array]:
+    def nodes(self, rows: Indices, breaks: Breaks = NO_BREAKS) -> Samples:
         shape = rows.size, self._degree.size
         return np.broadcast_to(self._degree, shape), np.broadcast_to(1.0, shape)
 
-    def coarse(self, rows: Indices, *, fine: bool = False) -> tuple[Array, Array]:
+    def coarse(self, rows: Indices, *, fine: bool = False) -> Samples:
         return self.nodes(rows)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isclose
 from operator import attrgetter
@@ -10,23 +11,29 @@ from typing import Any
 
 import numpy as np
 
+from mdfconv.conversion.values import Converted
 from mdfconv.distributions.dialects import DIALECTS, Dialect
-from mdfconv.distributions.endpoint import Endpoint
-from mdfconv.errors import MdfconvError
+from mdfconv.distributions.endpoint import Endpoint, endpoints
+from mdfconv.distributions.parameter import number_text
+from mdfconv.errors import MdfconvError, MdfconvWarning
 from mdfconv.fitting.metrics import Metric, metric_named
-from mdfconv.scene.gltf.container import read_container
-from mdfconv.scene.gltf.document import FACTOR, PBR, GltfDocument, read_document
-from mdfconv.scene.gltf.factors import convert_factors, factor_endpoints
+from mdfconv.scene.gltf.document import FACTOR, PBR, GltfDocument
 from mdfconv.scene.gltf.images import GltfTextures
-from mdfconv.scene.gltf.textures import TextureChanges, convert_textures
+from mdfconv.scene.gltf.textures import TextureConversion
 from mdfconv.scene.material_files import FileConversion
 from mdfconv.scene.shininess import ROUGHNESS
+from mdfconv.scene.stored import (
+    ConvertedNumber,
+    MaterialProblem,
+    Outcome,
+    ProblemKind,
+    StoredConverter,
+)
 
+_LIMITS = {Outcome.UNIFORM: "a uniform lobe", Outcome.MIRROR: "a mirror"}
 # Digits enough that an exponent comes back from a roughness to six.
 _DIGITS = 8
 _SAME = 0.5e-8
-# What is wrong with a material whose texture is not to be converted.
-HAS_TEXTURE = "has a roughness texture"
 
 
 @dataclass(frozen=True)
@@ -110,46 +117,70 @@ def convert_gltf(
     MdfconvError
         If the file is no glTF 2.0, or a name or the metric is not known.
     """
-    ends = factor_endpoints(source, target)
-    kept = metric_named(metric)
-    container = read_container(data)
-    document = read_document(container.json)
+    pair = factor_endpoints(source, target)
+    metric = metric_named(metric)
+    document = GltfDocument(data)
     factors, problems = _factors(document)
     textured = {at: factor for at, factor in factors.items() if factor and document.texture_of(at)}
-    if textures:
-        changes = convert_textures(document, container, textured, ends, kept, textures)
-    else:
-        changes = TextureChanges(problems=dict.fromkeys(textured, HAS_TEXTURE))
-    materials = [
-        GltfMaterial(document.name(at), at, factors[at], 1.0, np.nan, np.nan, notes)
-        for at, notes in changes.notes.items()
-    ]
     plain = {at: factor for at, factor in factors.items() if at not in textured}
-    converted, left = _converted(document, plain, ends, kept)
-    materials += converted
-    problems |= changes.problems | left
+    materials: list[GltfMaterial] = []
+    changes = None
+    if textures:
+        changes = TextureConversion(document, textures, *pair, metric, textured)
+        materials = [
+            GltfMaterial(document.name(at), at, factors[at], 1.0, np.nan, np.nan, notes)
+            for at, notes in changes.notes.items()
+        ]
+        problems |= changes.problems
+    else:
+        problem = "has a roughness texture", ProblemKind.TEXTURE
+        problems |= dict.fromkeys(textured, problem)
+    numbers, reasons, notes = _numbers(plain.values(), StoredConverter(*pair, metric))
+    for at, factor in plain.items():
+        if factor in reasons:
+            problems[at] = reasons[factor], ProblemKind.OTHER
+        else:
+            _, parameter, result, _, rmse = numbers[factor]
+            row = factor, result, rmse, parameter, notes.get(factor, ())
+            materials.append(GltfMaterial(document.name(at), at, *row))
     document.set_factors(_texts(materials))
-    json = document.encoded()
     return GltfConversion(
-        data=data if json == container.json else container.with_json(json, changes.appended),
+        data=document.encoded(),
         materials=tuple(sorted(materials, key=attrgetter("index"))),
-        problems=tuple((f"materials[{at}]", problems[at]) for at in sorted(problems)),
-        files=changes.files,
-        inputs=changes.inputs,
+        problems=tuple(
+            MaterialProblem(f"materials[{at}]", *problems[at]) for at in sorted(problems)
+        ),
+        files=changes.files if changes else {},
+        inputs=changes.inputs if changes else (),
         generator=document.generator,
         named=document.named_files,
     )
 
 
-def _factors(document: GltfDocument) -> tuple[dict[int, float], dict[int, str]]:
+def factor_endpoints(source: str | Endpoint, target: str | Endpoint) -> tuple[Endpoint, Endpoint]:
+    """Return both ends of a conversion; refuse what is used beyond 1, as an exponent is."""
+    pair = endpoints(source, target)
+    for argument, end in zip(("source", "target"), pair, strict=True):
+        if end.stored.typical[1] > 1:
+            raise MdfconvError(
+                f"a roughness factor is at most 1, {end.label} is more as a rule",
+                "name what the program stores",
+                argument=argument,
+            )
+    return pair
+
+
+def _factors(
+    document: GltfDocument,
+) -> tuple[dict[int, float], dict[int, tuple[str, ProblemKind]]]:
     """Return the roughness factors by the places of their materials, and what is wrong."""
     factors: dict[int, float] = {}
-    problems: dict[int, str] = {}
+    problems: dict[int, tuple[str, ProblemKind]] = {}
     for at, material in enumerate(document.materials):
         try:
             factors[at] = _factor(material)
         except MdfconvError as error:
-            problems[at] = str(error)
+            problems[at] = str(error), ProblemKind.OTHER
     return factors, problems
 
 
@@ -168,29 +199,31 @@ def _factor(material: Any) -> float:
     return float(factor)
 
 
-def _converted(
-    document: GltfDocument,
-    factors: Mapping[int, float],
-    ends: tuple[Endpoint, Endpoint],
-    metric: Metric,
-) -> tuple[list[GltfMaterial], dict[int, str]]:
-    """Return the conversions of materials without a texture, and why others have none."""
-    # A file repeats its values.
-    values, which = np.unique(np.array(list(factors.values())), return_inverse=True)
-    answers = convert_factors(values, *ends, metric)
-    notes, reasons = answers.notes, answers.problems
-    columns = [each.tolist() for each in (values, answers.result, answers.rmse, answers.parameter)]
-    rows = list(zip(*columns, strict=True))
-    materials, problems = [], {}
-    for at, number in zip(factors, which.tolist(), strict=True):
-        if number in reasons:
-            problems[at] = reasons[number]
-        else:
-            note = (notes[number],) if number in notes else ()
-            value, result, rmse, parameter = rows[number]
-            name = document.name(at)
-            materials.append(GltfMaterial(name, at, value, result, rmse, parameter, note))
-    return materials, problems
+def _numbers(
+    factors: Iterable[float], convert: StoredConverter
+) -> tuple[dict[float, ConvertedNumber], dict[float, str], dict[float, tuple[str, ...]]]:
+    """Return conversions of factors, why some have none, and what to know of mirrors and such."""
+    numbers = convert.table(factors)
+    reasons: dict[float, str] = {}
+    notes: dict[float, tuple[str, ...]] = {}
+    for factor, number in numbers.items():
+        result = number_text(number.result)
+        if number.outcome in _LIMITS:
+            symbol = convert.source.stored.symbol
+            text = f"{symbol} = {number_text(factor)} is {_LIMITS[number.outcome]}: {result}"
+            notes[factor] = (text,)
+        elif number.outcome is not Outcome.CONVERTED:
+            reasons[factor] = convert.refusal(number)
+        elif number.result > 1:
+            reasons[factor] = f"{convert.target.label} would be {result}, above 1"
+    converted = [each for each in numbers.values() if each.outcome is Outcome.CONVERTED]
+    parameter = np.array([each.parameter for each in converted])
+    stored = np.array([each.result for each in converted])
+    results = Converted(parameter, stored, convert.target.decode_legal(stored))
+    sentences = convert.rule.true_cautions(results)
+    if sentences:
+        warnings.warn("; ".join(sentences), MdfconvWarning, stacklevel=3)
+    return numbers, reasons, notes
 
 
 def _texts(materials: Sequence[GltfMaterial]) -> dict[int, str]:
@@ -205,14 +238,8 @@ def _texts(materials: Sequence[GltfMaterial]) -> dict[int, str]:
 
 
 def generator_of(data: bytes) -> str:
-    """Return what wrote a glTF file, as it says itself in ``asset.generator``; "" if nothing.
-
-    Raises
-    ------
-    MdfconvError
-        If the file is no glTF.
-    """
-    return read_document(read_container(data).json).generator
+    """Return what wrote a glTF file, as it says itself in ``asset.generator``; "" if nothing."""
+    return GltfDocument(data).generator
 
 
 def dialects_by_generator(generator: str) -> Iterator[Dialect]:

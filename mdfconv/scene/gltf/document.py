@@ -1,20 +1,27 @@
-"""The JSON of a glTF file: its materials found, and changed in place."""
+"""A glTF file: JSON alone or in a GLB; its materials found, and changed in place."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import struct
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 from urllib.parse import unquote
 
 from mdfconv.errors import MdfconvError
-from mdfconv.scene.gltf.json_edit import JsonText, Place, read_json
+from mdfconv.scene.gltf.json_edit import Place, read_json
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 FACTOR = "roughnessFactor"
 TEXTURE = "metallicRoughnessTexture"
 PBR = "pbrMetallicRoughness"
+# A GLB has a header, and chunks: their size and type, and content.
+_MAGIC, _VERSION = b"glTF", 2
+_HEADER, _CHUNK_HEAD = struct.Struct("<4sII"), struct.Struct("<I4s")
+_JSON, _BINARY = b"JSON", b"BIN\0"
+_ALIGNMENT = 4
+_LARGEST = 2**32 - 1
 
 
 def is_address(uri: str) -> bool:
@@ -22,30 +29,46 @@ def is_address(uri: str) -> bool:
     return uri.startswith("//") or bool(_SCHEME.match(uri))
 
 
+def is_glb(data: bytes) -> bool:
+    """Return whether a file is a GLB by its first bytes."""
+    return data.startswith(_MAGIC)
+
+
 class GltfDocument:
-    """The JSON of a glTF file.
+    """A glTF file, and the changes to it; what is no glTF 2.0 is refused."""
 
-    Parameters
-    ----------
-    json : JsonText
-        The text.
-
-    Raises
-    ------
-    MdfconvError
-        If it is no glTF 2.0.
-    """
-
-    def __init__(self, json: JsonText) -> None:
-        self.json = json
-        asset = json.value.get("asset")
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        # What is behind the JSON in a GLB.
+        self._text, self._chunks = _pieces(data) if is_glb(data) else (data, [])
+        self._appended = bytearray()
+        self.json = read_json(self._text)
+        asset = self.json.value.get("asset")
         self._asset = asset if isinstance(asset, dict) else {}
         version = str(self._asset.get("version", "2.0"))
         if not version.startswith("2."):
             raise MdfconvError(f"is glTF of version {' '.join(version.split())}, not 2.0")
-        self.materials: list[Any] = json.value.get("materials", [])
+        self.materials: list[Any] = self.json.value.get("materials", [])
         if not isinstance(self.materials, list):
             raise MdfconvError("is no glTF 2.0: its materials are no array")
+
+    @property
+    def binary(self) -> bytes | memoryview | None:
+        """The content of the binary chunk, with its padding; None if there is none."""
+        kind, content = self._chunks[0] if self._chunks else (b"", b"")
+        return content if kind == _BINARY else None
+
+    def append_binary(self, content: bytes) -> int:
+        """Add bytes to the binary chunk; return where in it they are."""
+        self._appended += bytes(_padding(len(self._appended)))
+        place = self._binary_size + len(self._appended)
+        self._appended += content
+        return place
+
+    @property
+    def _binary_size(self) -> int:
+        size = len(self.binary or b"")
+        return size + _padding(size)
 
     @property
     def generator(self) -> str:
@@ -125,8 +148,22 @@ class GltfDocument:
         return self.array("materials")
 
     def encoded(self) -> bytes:
-        """Return the text with all changes as bytes."""
-        return self.json.changed().encode()
+        """Return the file with all changes, every other chunk of a GLB as it is."""
+        if self._appended:
+            length = self._binary_size + len(self._appended)
+            self.json.set_members(self.array("buffers")[0].start, {"byteLength": str(length)})
+        text = self.json.changed().encode()
+        if text == self._text:
+            return self._data
+        if not is_glb(self._data):
+            return text
+        chunks: list[tuple[bytes, list[bytes | memoryview]]]
+        chunks = [(_JSON, [text, b" " * _padding(len(text))])]
+        chunks += [(kind, [content]) for kind, content in self._chunks]
+        if self._appended:
+            appended, binary = bytes(self._appended), chunks[1][1]
+            binary += [bytes(_padding(len(binary[0]))), appended, bytes(_padding(len(appended)))]
+        return _glb(chunks)
 
     @cached_property
     def everything(self) -> list[tuple[str, Any]]:
@@ -142,24 +179,63 @@ class GltfDocument:
 
 def walk(value: Any) -> list[tuple[str, Any]]:
     """Return all members of all objects within a value, however deeply."""
-    found: list[tuple[str, Any]] = []
+    members: list[tuple[str, Any]] = []
     waiting = [value]
     while waiting:
         value = waiting.pop()
         if isinstance(value, dict):
-            found += value.items()
+            members += value.items()
             waiting += value.values()
         elif isinstance(value, list):
             waiting += value
-    return found
+    return members
 
 
-def read_document(data: bytes) -> GltfDocument:
-    """Return the document of a glTF file's JSON.
+def _padding(size: int) -> int:
+    """Return how many bytes are left to the next multiple of four, where parts of a GLB start."""
+    return -size % _ALIGNMENT
 
-    Raises
-    ------
-    MdfconvError
-        If it is no JSON, or no glTF 2.0.
-    """
-    return GltfDocument(read_json(data))
+
+def _pieces(data: bytes) -> tuple[bytes, list[tuple[bytes, memoryview]]]:
+    """Return the JSON of a GLB, and the types and contents of the chunks behind it."""
+    if len(data) < _HEADER.size:
+        raise MdfconvError(f"is a GLB of {len(data)} bytes, less than its header")
+    _, version, length = _HEADER.unpack_from(data)
+    if version != _VERSION:
+        raise MdfconvError(f"is a GLB of version {version}, not {_VERSION}")
+    if length != len(data):
+        raise MdfconvError(f"is a GLB of {length} bytes by its header, but has {len(data)}")
+    chunks: list[tuple[bytes, memoryview]] = []
+    position, view = _HEADER.size, memoryview(data)
+    while position < len(data):
+        start = position + _CHUNK_HEAD.size
+        if start > len(data):
+            raise MdfconvError(f"is a GLB that ends within the head of chunk {len(chunks)}")
+        size, kind = _CHUNK_HEAD.unpack_from(data, position)
+        position = start + size
+        if position > len(data):
+            raise MdfconvError(
+                f"is a GLB whose chunk {len(chunks)} of {size} bytes is larger than what is left "
+                f"of the file, {len(data) - start}"
+            )
+        chunks.append((kind, view[start:position]))
+    if not chunks or chunks[0][0] != _JSON:
+        raise MdfconvError("is a GLB whose first chunk is no JSON")
+    text = bytes(chunks[0][1])
+    # It is filled up by blanks, in some files by zeros.
+    end = len(text)
+    while end > max(0, len(text) - _ALIGNMENT + 1) and text[end - 1] in b" \0":
+        end -= 1
+    return text[:end], chunks[1:]
+
+
+def _glb(chunks: Sequence[tuple[bytes, Sequence[bytes | memoryview]]]) -> bytes:
+    """Return a GLB of chunks in pieces, which are not copied one by one."""
+    sizes = [sum(map(len, pieces)) for _, pieces in chunks]
+    total = _HEADER.size + sum(size + _CHUNK_HEAD.size for size in sizes)
+    if total > _LARGEST:
+        raise MdfconvError("would no longer fit into a GLB, which ends at 4 GiB")
+    parts: list[bytes | memoryview] = [_HEADER.pack(_MAGIC, _VERSION, total)]
+    for size, (kind, pieces) in zip(sizes, chunks, strict=True):
+        parts += [_CHUNK_HEAD.pack(size, kind), *pieces]
+    return b"".join(parts)

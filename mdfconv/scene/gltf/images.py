@@ -13,7 +13,6 @@ from typing import Any
 from urllib.parse import quote, unquote
 
 from mdfconv.errors import MdfconvError
-from mdfconv.scene.gltf.container import Container, aligned
 from mdfconv.scene.gltf.document import GltfDocument, is_address
 from mdfconv.scene.gltf.json_edit import JsonText
 from mdfconv.scene.material_files import free_name, read_file
@@ -44,13 +43,7 @@ class GltfTextures:
 
 
 def index_of(value: Any, entries: list[Any], what: str) -> int:
-    """Return an index into the entries of a file, which are objects.
-
-    Raises
-    ------
-    MdfconvError
-        If there is no such entry.
-    """
+    """Return an index into the entries of a file; refuse what names none that is an object."""
     if not is_count(value) or not 0 <= value < len(entries):
         raise MdfconvError(f"names no {what} that is there")
     if not isinstance(entries[int(value)].value, dict):
@@ -65,42 +58,20 @@ def is_count(value: Any) -> bool:
 
 
 class GltfImages:
-    """The images of a file.
+    """The images of a document, which is changed; new files have an ending before the suffix."""
 
-    Parameters
-    ----------
-    document : GltfDocument
-        The JSON, which is changed.
-    container : Container
-        The file.
-    folders : GltfTextures
-        Where other files are.
-    ending : str
-        What the names of new files end in, before the suffix.
-    """
-
-    def __init__(
-        self, document: GltfDocument, container: Container, folders: GltfTextures, ending: str
-    ) -> None:
-        self._document, self._container = document, container
-        self._folders, self._ending = folders, ending
+    def __init__(self, document: GltfDocument, folders: GltfTextures, ending: str) -> None:
+        self._document, self._folders, self._ending = document, folders, ending
         self.images, self._views, self._buffers = (
             document.array(name) for name in ("images", "bufferViews", "buffers")
         )
         self.files: dict[Path, bytes] = {}
-        self.appended = b""
         self._read: dict[Path, bytes] = {}
         self._new_images: list[str] = []
         self._new_views: list[str] = []
 
     def read(self, image: int) -> tuple[bytes, str]:
-        """Return the content of an image and the suffix of its form.
-
-        Raises
-        ------
-        MdfconvError
-            If it cannot be found, or is neither PNG nor JPEG.
-        """
+        """Return the content of an image and the suffix of its form."""
         entry = self.images[image].value
         if ("uri" in entry) == ("bufferView" in entry):
             raise MdfconvError("has not one of uri and bufferView")
@@ -134,10 +105,6 @@ class GltfImages:
         """Write what was added into the document."""
         self._document.append("images", self._new_images)
         self._document.append("bufferViews", self._new_views)
-        if self.appended:
-            size = len(self._container.binary or b"")
-            length = aligned(size) + len(self.appended)
-            self._document.json.set_members(self._buffers[0].start, {"byteLength": str(length)})
 
     @property
     def inputs(self) -> tuple[Path, ...]:
@@ -156,10 +123,8 @@ class GltfImages:
 
     def _append(self, content: bytes) -> dict[str, str]:
         """Append to the binary chunk; return the members of a buffer view of it."""
-        start = aligned(len(self._container.binary or b""))
-        offset = aligned(len(self.appended))
-        self.appended = self.appended.ljust(offset, b"\0") + content
-        return {"byteOffset": str(start + offset), "byteLength": str(len(content))}
+        offset = self._document.append_binary(content)
+        return {"byteOffset": str(offset), "byteLength": str(len(content))}
 
     def _placed(self, image: int, content: bytes) -> tuple[dict[str, str], dict[str, str]]:
         """Store a PNG where an image is; return members to set, and new names of members."""
@@ -217,8 +182,8 @@ class GltfImages:
         content: bytes | memoryview
         if "uri" in entry:
             content = self._from_uri(entry["uri"])
-        elif buffer == 0 and self._container.binary is not None:
-            content = self._container.binary
+        elif buffer == 0 and self._document.binary is not None:
+            content = self._document.binary
         else:
             raise MdfconvError(f"buffers[{buffer}] is not there")
         if not 0 <= offset <= offset + length <= len(content):

@@ -21,41 +21,22 @@ _DECODER, _ALL_FLOATS = json.JSONDecoder(), json.JSONDecoder(parse_int=float)
 
 
 class Place(NamedTuple):
-    """A value and where it stands in the text.
-
-    Parameters
-    ----------
-    value : Any
-        The value.
-    start, end : int
-        Its first character, and that after its last.
-    key_start : int
-        The first character of its key; that of the value itself in an array.
-    colon : str
-        What stands between key and value.
-    """
+    """A value and where it stands in the text, the character after its last one included."""
 
     value: Any
     start: int
     end: int
+    # The first character of the key; that of the value itself in an array.
     key_start: int
+    # What stands between key and value.
     colon: str = ""
 
 
 class JsonText:
     """The text of a JSON object, and the changes to it.
 
-    Of several members with one name the last counts, as for most readers.
-
-    Parameters
-    ----------
-    text : str
-        The text; it may start with a byte order mark.
-
-    Raises
-    ------
-    MdfconvError
-        If it is no JSON object, or nested more deeply than Python reads.
+    Of several members with one name the last counts, as for most readers. The text may start with
+    a byte order mark; what is no object, or nested more deeply than Python reads, is refused.
     """
 
     def __init__(self, text: str) -> None:
@@ -88,48 +69,36 @@ class JsonText:
     def members(self, start: int) -> dict[str, Place]:
         """Return the members of the object that starts at a character."""
         text, position = self._text, start + 1
-        found = {}
+        members = {}
         while match := _KEY.match(text, position):
             value, end = _decode(text, match.end())
             key = match[1]
             name = key[1:-1] if key.isprintable() and "\\" not in key else json.loads(key)
-            found[name] = Place(value, match.end(), end, match.start(1), match[2])
+            members[name] = Place(value, match.end(), end, match.start(1), match[2])
             comma = _COMMA.match(text, end)
             if not comma:
                 break
             position = comma.end()
-        return found
+        return members
 
     def elements(self, start: int) -> list[Place]:
         """Return the elements of the array that starts at a character."""
         text, position = self._text, _skip(self._text, start + 1)
-        found: list[Place] = []
+        elements: list[Place] = []
         while text[position] != "]":
             value, end = _decode(text, position)
-            found.append(Place(value, position, end, position))
+            elements.append(Place(value, position, end, position))
             comma = _COMMA.match(text, end)
             if not comma:
                 break
             position = comma.end()
-        return found
+        return elements
 
     def numbers_named(self, name: str, place: Place) -> list[tuple[int, int]] | None:
         """Return where the numbers of all members of one name stand, however deeply.
 
+        Start and end are the same for what is no number; None if names may be written in escapes.
         It takes a tenth of the time of looking at every member.
-
-        Parameters
-        ----------
-        name : str
-            The name, of letters.
-        place : Place
-            Within which value.
-
-        Returns
-        -------
-        list of (int, int) or None
-            Start and end of each number, the same for what is no number. None if names may be
-            written in escapes.
         """
         if self._text.find("\\u", place.start, place.end) >= 0:
             return None
@@ -151,16 +120,9 @@ class JsonText:
     def set_members(
         self, start: int, values: Mapping[str, str], renamed: Mapping[str, str] | None = None
     ) -> None:
-        """Replace members of an object, or add them behind its last one, in its layout.
+        """Replace members of the object at a character, or add them behind its last one.
 
-        Parameters
-        ----------
-        start : int
-            The first character of the object.
-        values : mapping of str to str
-            From names to values in JSON.
-        renamed : mapping of str to str, optional
-            New names of members.
+        The values are in JSON; what is added is in the object's layout. Members may get new names.
         """
         members = self.members(start)
         for name, new_name in (renamed or {}).items():
@@ -199,13 +161,7 @@ class JsonText:
 
 
 def read_json(data: bytes) -> JsonText:
-    """Return the JSON that bytes hold.
-
-    Raises
-    ------
-    MdfconvError
-        If they are no UTF-8, and as `JsonText`.
-    """
+    """Return the JSON that bytes hold."""
     try:
         return JsonText(data.decode())
     except UnicodeDecodeError as error:

@@ -14,15 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from mdfconv.errors import MdfconvError
-from mdfconv.scene.mitsuba.xml_edit import (
-    Element,
-    Lines,
-    apply_edits,
-    attribute_text,
-    children_insertion,
-    read_elements,
-    value_place,
-)
+from mdfconv.scene.mitsuba.xml_edit import Element, read_elements
 
 # What Mitsuba's distributions are here. Those of 0.6 have an exponent for an α.
 _EXPONENT = "blinn-phong:mitsuba-phong"
@@ -108,6 +100,16 @@ class Bsdf:
         """What its α or its exponent is, as `mdfconv.convert` names it."""
         return DISTRIBUTIONS.get(self.distribution, self.distribution)
 
+    @property
+    def numbers(self) -> list[float]:
+        """Its α that are no textures."""
+        return [each.value for each in self.roughness if not math.isnan(each.value)]
+
+    @property
+    def textures(self) -> list[Element]:
+        """The textures of its α."""
+        return [each.holder for each in self.roughness if each.textured and each.holder is not None]
+
 
 @dataclass
 class MitsubaScene:
@@ -125,12 +127,9 @@ class MitsubaScene:
         All files that it names.
     uses : Counter
         How often each default or texture is used, by its element.
-    lines : Lines
-        The lines of elements.
     """
 
     version: int | None
-    lines: Lines
     bsdfs: list[Bsdf] = field(default_factory=list)
     includes: list[Element] = field(default_factory=list)
     named: list[str] = field(default_factory=list)
@@ -148,7 +147,7 @@ def read_scene(data: bytes) -> MitsubaScene:
     elements = read_elements(data)
     names = _Names(elements, parameters=b"$" in data)
     version = re.match(r"\s*(\d{1,9})\b", elements[0].attributes.get("version", ""))
-    scene = MitsubaScene(int(version[1]) if version else None, Lines(data), uses=names.uses)
+    scene = MitsubaScene(int(version[1]) if version else None, uses=names.uses)
     for element in elements:
         if element.tag == "include":
             scene.includes.append(element)
@@ -204,10 +203,6 @@ def _parameters_used(elements: list[Element]) -> Iterator[str]:
                 yield from _USED.findall(value)
 
 
-class _RefusalError(Exception):
-    """Why a BSDF cannot be converted."""
-
-
 def _microfacet_bsdf(element: Element, version: int | None, names: _Names) -> Bsdf:
     bsdf = Bsdf(element)
     try:
@@ -217,11 +212,11 @@ def _microfacet_bsdf(element: Element, version: int | None, names: _Names) -> Bs
             bsdf.distribution = _distribution(bsdf.named_by, version)
         if alphas.keys() not in _ALPHAS:
             given = " and ".join(alphas)
-            raise _RefusalError(f"{given}: neither alpha alone nor alpha_u and alpha_v")
+            raise MdfconvError(f"{given}: neither alpha alone nor alpha_u and alpha_v")
         bsdf.roughness = tuple([_roughness(alphas[name], names) for name in sorted(alphas)])
         if not alphas:
             bsdf.roughness = (Roughness(DEFAULT_ALPHA),)
-    except _RefusalError as refusal:
+    except MdfconvError as refusal:
         bsdf.problem = str(refusal)
     return bsdf
 
@@ -232,7 +227,7 @@ def _properties(bsdf: Element) -> dict[str, Element]:
     for child in bsdf.children:
         name = _PROPERTIES.get(child.attributes.get("name", ""))
         if name in found:
-            raise _RefusalError(f"{name} is given twice")
+            raise MdfconvError(f"{name} is given twice")
         if name is not None:
             found[name] = child
     return found
@@ -242,9 +237,9 @@ def _distribution(element: Element, version: int | None) -> str:
     written = element.attributes.get("value", "")
     name = written.strip().lower()
     if element.tag != "string" or name not in DISTRIBUTIONS:
-        raise _RefusalError(f"distribution '{written}' is none of {', '.join(DISTRIBUTIONS)}")
+        raise MdfconvError(f"distribution '{written}' is none of {', '.join(DISTRIBUTIONS)}")
     if name not in TARGETS and version is not None and version > 0:
-        raise _RefusalError(f"distribution '{written}' is one of Mitsuba 0.6, not of {version}")
+        raise MdfconvError(f"distribution '{written}' is one of Mitsuba 0.6, not of {version}")
     return name
 
 
@@ -255,20 +250,18 @@ def _roughness(element: Element, names: _Names) -> Roughness:
     if element.tag == "ref":
         identifier = element.attributes.get("id", "")
         if identifier not in names.textures:
-            raise _RefusalError(
-                f"{name} refers to '{identifier}', which is no texture in this file"
-            )
+            raise MdfconvError(f"{name} refers to '{identifier}', which is no texture in this file")
         return Roughness(math.nan, names.textures[identifier], textured=True)
     if element.tag != "float":
-        raise _RefusalError(f"{name} is a {element.tag}, not a float")
+        raise MdfconvError(f"{name} is a {element.tag}, not a float")
     if "$" not in value:
         return Roughness(_number(name, value), element)
     parameter = _PARAMETER.match(value.strip())
     if not parameter:
-        raise _RefusalError(f"{name} '{value}' is not a number")
+        raise MdfconvError(f"{name} '{value}' is not a number")
     default = names.defaults.get(parameter[1])
     if default is None:
-        raise _RefusalError(
+        raise MdfconvError(
             f"{name} is the parameter {parameter[1]}, which has no default in this file"
         )
     number = _number(f"the default of {parameter[1]},", default.attributes.get("value", ""))
@@ -277,7 +270,7 @@ def _roughness(element: Element, names: _Names) -> Roughness:
 
 def _number(name: str, text: str) -> float:
     if not _NUMBER.match(text.strip()):
-        raise _RefusalError(f"{name} '{text}' is not a number")
+        raise MdfconvError(f"{name} '{text}' is not a number")
     return float(text)
 
 
@@ -286,7 +279,7 @@ def _phong_bsdf(element: Element, names: _Names) -> Bsdf:
     given = [child for child in element.children if child.attributes.get("name") == "exponent"]
     try:
         values = [_roughness(child, names).value for child in given] or [_DEFAULT_EXPONENT]
-    except _RefusalError:
+    except MdfconvError:
         values = [math.nan]
     bsdf.roughness = (Roughness(values[0]),)
     return bsdf
@@ -329,29 +322,23 @@ def _is_one(text: str) -> bool:
     return bool(_NUMBER.match(text)) and float(text) == 1
 
 
-def leave_what_others_use(scene: MitsubaScene, target: str) -> None:
+def leave_what_others_use(scene: MitsubaScene, pending: Sequence[Bsdf]) -> None:
     """Give a problem to BSDFs whose default or texture cannot be changed for all that use it.
 
-    Parameters
-    ----------
-    scene : Scene
-        BSDFs that are left for another reason have their problem already.
-    target : str
-        The distribution that the others are to have.
+    Those that are to be converted may be left for another reason, and have a problem already.
     """
     users: dict[Element, list[tuple[Bsdf, Roughness]]] = {}
-    for bsdf in scene.bsdfs:
-        if not bsdf.problem and bsdf.distribution not in (target, PHONG_EXPONENT):
+    for bsdf in pending:
+        if not bsdf.problem:
             for roughness in bsdf.roughness:
                 if roughness.shared and roughness.holder is not None:
                     users.setdefault(roughness.holder, []).append((bsdf, roughness))
-    pending = [holder for holder, group in users.items() if _others_use(scene, holder, group)]
-    while pending:
-        holder = pending.pop()
-        for bsdf, own in users.pop(holder, []):
+    unsettled = [holder for holder, group in users.items() if _others_use(scene, holder, group)]
+    while unsettled:
+        for bsdf, roughness in users.pop(unsettled.pop(), []):
             if not bsdf.problem:
-                bsdf.problem = _shared_problem(scene, own)
-                pending += [each.holder for each in bsdf.roughness if each.holder is not None]
+                bsdf.problem = _shared_problem(scene, roughness)
+                unsettled += [each.holder for each in bsdf.roughness if each.holder is not None]
 
 
 def _others_use(scene: MitsubaScene, holder: Element, users: list[tuple[Bsdf, Roughness]]) -> bool:
@@ -371,53 +358,3 @@ def _shared_problem(scene: MitsubaScene, roughness: Roughness) -> str:
     if scene.includes:
         return f"alpha is {what}, which an included file may use, too"
     return f"alpha is {what}, which is not only that of BSDFs converted alike"
-
-
-# Mitsuba computes with 24 bits, which takes nine digits to tell all apart.
-_DIGITS = 9
-
-
-class SceneEdits:
-    """The changes in the bytes of a scene.
-
-    Parameters
-    ----------
-    data : bytes
-        The scene.
-    target : str
-        The distribution that BSDFs are given.
-    """
-
-    def __init__(self, data: bytes, target: str) -> None:
-        self._data, self._target = data, target
-        self._edits: dict[int, tuple[int, bytes]] = {}
-
-    def result(self) -> bytes:
-        """Return the changed scene."""
-        return apply_edits(self._data, self._edits)
-
-    def set_file(self, element: Element, name: str) -> None:
-        """Change the attribute ``value`` to the name of another file."""
-        self._set_value(element, attribute_text(name))
-
-    def _set_value(self, element: Element, text: bytes) -> None:
-        start, end = value_place(self._data, element)
-        self._edits[start] = end, text
-
-    def convert(self, bsdf: Bsdf, results: Sequence[float]) -> None:
-        """Give a BSDF the target's distribution, and new numbers for its α; NaN of a texture."""
-        new: list[tuple[str, dict[str, str]]] = []
-        if bsdf.named_by is not None:
-            self._set_value(bsdf.named_by, self._target.encode())
-        elif self._target != DEFAULT_DISTRIBUTION:
-            new.append(("string", {"name": "distribution", "value": self._target}))
-        for each, result in zip(bsdf.roughness, results, strict=True):
-            number = f"{result:.{_DIGITS}g}"
-            if each.holder is None:
-                if result != DEFAULT_ALPHA:
-                    new.append(("float", {"name": "alpha", "value": number}))
-            elif not each.textured:
-                self._set_value(each.holder, number.encode())
-        if new:
-            start, end, text = children_insertion(self._data, bsdf.element, new)
-            self._edits[start] = end, text

@@ -7,7 +7,7 @@ entities, by which a small file can stand for a huge one, are refused before the
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 from xml.parsers import expat
 from xml.sax.saxutils import escape
@@ -17,7 +17,6 @@ from mdfconv.errors import MdfconvError
 # No scene is nested so deeply.
 DEEPEST = 1000
 _UTF_8 = ("utf-8", "utf8", "us-ascii", "ascii")
-_BLANK = rb"[ \t\r\n]"
 _ATTRIBUTE = rb"(?:[ \t\r\n]+[^ \t\r\n=/>]+[ \t\r\n]*=[ \t\r\n]*(?:\"[^\"]*\"|'[^']*'))"
 _NAME = rb"<[^ \t\r\n/>]+"
 _VALUE = re.compile(
@@ -31,10 +30,7 @@ _FIRST_LINES = 4096
 _QUOTE = re.compile(rb"[^\"']*([\"'])")
 
 
-# Most elements have none in them; never changed.
-_NONE: list[Any] = []
-
-
+@dataclass(slots=True, eq=False)
 class Element:
     """An element of an XML file.
 
@@ -44,37 +40,17 @@ class Element:
         Its name.
     attributes : dict of str to str
         The values that its attributes have for a reader: references replaced, blanks normalized.
-    start : int
-        Where its first byte, ``<``, stands.
+    start, line : int
+        Where its first byte, ``<``, stands, and in which line, counted from 1.
+    children : list of Element
+        Those directly in it, in order.
     """
 
-    __slots__ = ("attributes", "children", "start", "tag")
-
-    def __init__(self, tag: str, attributes: dict[str, str], start: int) -> None:
-        self.tag, self.attributes, self.start = tag, attributes, start
-        # Those directly in it, in order.
-        self.children: list[Element] = _NONE
-
-
-class Lines:
-    """The lines of a file, counted from 1: quick for places that are asked for in order."""
-
-    def __init__(self, data: bytes) -> None:
-        self._data = data
-        self._position, self._line = 0, 1
-        self._returns = b"\r" in data
-
-    def __call__(self, position: int) -> int:
-        """Return the line of a byte that does not end one."""
-        if position < self._position:
-            self._position, self._line = 0, 1
-        part = self._position, position
-        count = self._data.count
-        self._line += count(b"\n", *part)
-        if self._returns:
-            self._line += count(b"\r", *part) - count(b"\r\n", *part)
-        self._position = position
-        return self._line
+    tag: str
+    attributes: dict[str, str]
+    start: int
+    line: int
+    children: list[Element] = field(default_factory=list)
 
 
 def read_elements(data: bytes) -> list[Element]:
@@ -88,33 +64,26 @@ def read_elements(data: bytes) -> list[Element]:
     """
     if data[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\0" in data[:4]:
         raise MdfconvError("the file is not in UTF-8, the only encoding of XML that is read")
+    elements: list[Element] = []
+    open_elements: list[Element] = []
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        element = Element(tag, attributes, parser.CurrentByteIndex, parser.CurrentLineNumber)
+        elements.append(element)
+        if open_elements:
+            open_elements[-1].children.append(element)
+        open_elements.append(element)
+        if len(open_elements) > DEEPEST:
+            raise MdfconvError(f"elements are nested more than {DEEPEST} levels deep")
+
     parser = expat.ParserCreate()
     # Defaults that a document type gives to attributes have no bytes to change.
     parser.specified_attributes = True
     parser.XmlDeclHandler = _check_encoding
     parser.StartDoctypeDeclHandler = _check_document_type
     parser.EntityDeclHandler = _refuse_entity
-    elements: list[Element] = []
-    open_ones: list[Element] = []
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        element = Element(tag, attributes, parser.CurrentByteIndex)
-        elements.append(element)
-        if open_ones:
-            parent = open_ones[-1]
-            if not parent.children:
-                parent.children = [element]
-            else:
-                parent.children.append(element)
-        open_ones.append(element)
-        if len(open_ones) > DEEPEST:
-            raise MdfconvError(f"elements are nested more than {DEEPEST} levels deep")
-
-    def end(tag: str) -> None:
-        open_ones.pop()
-
     parser.StartElementHandler = start
-    parser.EndElementHandler = end
+    parser.EndElementHandler = lambda _: open_elements.pop()
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
@@ -137,70 +106,87 @@ def _refuse_entity(name: str, *_: Any) -> None:
     raise MdfconvError(f"the file declares the entity {name}, and entities are not read")
 
 
-def value_place(data: bytes, element: Element) -> tuple[int, int]:
-    """Return where the attribute ``value``, which an element has, starts and ends in the file.
-
-    The blanks around it do not belong to it.
-    """
-    match = _VALUE.match(data, element.start)
-    assert match is not None
-    which = match.lastindex or 1
-    start, end = match.span(which)
-    text = match[which]
-    return start + len(text) - len(text.lstrip()), end - len(text) + len(text.rstrip())
-
-
-def _start_tag(data: bytes, element: Element) -> re.Match[bytes]:
-    match = _START_TAG.match(data, element.start)
-    assert match is not None
-    return match
-
-
 def attribute_text(value: str) -> bytes:
     """Return what stands between quotes, of either kind, for a value of an attribute."""
     return escape(value, {'"': "&quot;", "'": "&apos;"}).encode()
 
 
-def children_insertion(
-    data: bytes, element: Element, children: list[tuple[str, dict[str, str]]]
-) -> tuple[int, int, bytes]:
-    """Return the edit that puts empty elements before the children of an element.
+class XmlEdits:
+    """Changes in the bytes of an XML file, of which none overlap."""
 
-    They stand as its first child does, or if it has none a step further in than itself, and have
-    its quotes.
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        # From where a piece starts to where it ends, and what takes its place.
+        self._edits: dict[int, tuple[int, bytes]] = {}
 
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    element : Element
-        Read from it.
-    children : list of (str, dict)
-        Tags and attributes.
+    def result(self) -> bytes:
+        """Return the changed file."""
+        pieces: list[bytes] = []
+        position = 0
+        for start, (end, new) in sorted(self._edits.items()):
+            pieces += (self._data[position:start], new)
+            position = end
+        return b"".join([*pieces, self._data[position:]])
 
-    Returns
-    -------
-    int, int, bytes
-        Where what is to be replaced starts and ends, and what takes its place.
-    """
-    tag = _start_tag(data, element)
-    ending = b"/>"
-    if element.children:
-        gap, closing = _blanks_before(data, element.children[0].start), b""
-        first = _start_tag(data, element.children[0])
-        ending = first[1] if first[2] else ending
-    else:
-        closing = _blanks_before(data, element.start)
-        gap = closing and closing + _step(data, closing)
-        if not tag[2] and data[tag.end() : tag.end() + 2] != b"</":
-            closing = b""
-    quote = _QUOTE.match(tag[0])
-    mark = quote[1] if quote else b'"'
-    inner = b"".join(gap + _empty_element(*child, mark, ending) for child in children) + closing
-    if not tag[2]:
-        return tag.end(), tag.end(), inner
-    name = element.tag.encode()
-    return *tag.span(1), b">" + inner + b"</" + name + b">"
+    def set_value(self, element: Element, text: bytes) -> None:
+        """Change the attribute ``value``, which an element has; the blanks around it are kept."""
+        match = _VALUE.match(self._data, element.start)
+        assert match is not None
+        start, end = match.span(match.lastindex or 1)
+        old = self._data[start:end]
+        start, end = start + len(old) - len(old.lstrip()), end - len(old) + len(old.rstrip())
+        self._edits[start] = end, text
+
+    def add_children(self, element: Element, children: list[tuple[str, dict[str, str]]]) -> None:
+        """Put empty elements, tags with attributes, before the children of an element.
+
+        They stand as its first child does, or if it has none a step further in than itself, and
+        have its quotes.
+        """
+        tag = self._start_tag(element)
+        ending = b"/>"
+        if element.children:
+            gap, closing = self._blanks_before(element.children[0].start), b""
+            first = self._start_tag(element.children[0])
+            ending = first[1] if first[2] else ending
+        else:
+            closing = self._blanks_before(element.start)
+            gap = closing and closing + self._step(closing)
+            if not tag[2] and self._data[tag.end() : tag.end() + 2] != b"</":
+                closing = b""
+        quoted = _QUOTE.match(tag[0])
+        quote = quoted[1] if quoted else b'"'
+        inner = b"".join(gap + _empty_element(*child, quote, ending) for child in children)
+        inner += closing
+        if tag[2]:
+            start, end = tag.span(1)
+            inner = b">" + inner + b"</" + element.tag.encode() + b">"
+        else:
+            start = end = tag.end()
+        self._edits[start] = end, inner
+
+    def _start_tag(self, element: Element) -> re.Match[bytes]:
+        match = _START_TAG.match(self._data, element.start)
+        assert match is not None
+        return match
+
+    def _blanks_before(self, position: int) -> bytes:
+        """Return the end of line and the indentation before an element that starts its line."""
+        start = position
+        while start and self._data[start - 1] in b" \t":
+            start -= 1
+        indentation = self._data[start:position]
+        if self._data[max(0, start - 2) : start] == b"\r\n":
+            return b"\r\n" + indentation
+        end = self._data[start - 1 : start]
+        return end + indentation if end in b"\r\n" else b""
+
+    def _step(self, blanks: bytes) -> bytes:
+        """Return by how much the children of an element are indented."""
+        if blanks.lstrip(b"\r\n").startswith(b"\t"):
+            return b"\t"
+        first = _INDENTATION.search(self._data, 0, _FIRST_LINES)
+        return first[1] if first else b"    "
 
 
 def _empty_element(tag: str, attributes: dict[str, str], quote: bytes, end: bytes) -> bytes:
@@ -209,42 +195,3 @@ def _empty_element(tag: str, attributes: dict[str, str], quote: bytes, end: byte
         for name, value in attributes.items()
     ]
     return b"<" + tag.encode() + b"".join(pairs) + end
-
-
-def _blanks_before(data: bytes, position: int) -> bytes:
-    """Return the end of line and the indentation before an element that starts its line."""
-    start = position
-    while start and data[start - 1] in b" \t":
-        start -= 1
-    indentation = data[start:position]
-    if data[max(0, start - 2) : start] == b"\r\n":
-        return b"\r\n" + indentation
-    return data[start - 1 : start] + indentation if data[start - 1 : start] in b"\r\n" else b""
-
-
-def _step(data: bytes, blanks: bytes) -> bytes:
-    """Return by how much the children of an element are indented."""
-    indentation = blanks.lstrip(b"\r\n")
-    if indentation.startswith(b"\t"):
-        return b"\t"
-    first = _INDENTATION.search(data, 0, _FIRST_LINES)
-    return first[1] if first else b"    "
-
-
-def apply_edits(data: bytes, edits: Mapping[int, tuple[int, bytes]]) -> bytes:
-    """Return a file with pieces of it replaced.
-
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    edits : mapping of int to (int, bytes)
-        From where a piece starts to where it ends, and what takes its place; none overlap.
-    """
-    pieces: list[bytes] = []
-    position = 0
-    for start in sorted(edits):
-        end, new = edits[start]
-        pieces += (data[position:start], new)
-        position = end
-    return b"".join([*pieces, data[position:]])

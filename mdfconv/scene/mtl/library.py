@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
-from mdfconv.scene.material_files import FileConversion
-from mdfconv.scene.mtl.statements import Line, lines, named_files, number, split_options
-from mdfconv.scene.shininess import exponent_of, fit_error, roughness_of
+from mdfconv.scene.material_files import FileConversion, TextureFolder
+from mdfconv.scene.mtl.statements import (
+    Line,
+    MaterialBlock,
+    named_files,
+    number,
+    read_library,
+    split_options,
+)
+from mdfconv.scene.shininess import ROUGHNESS, SHININESS, exponent_of, fit_error, roughness_of
+from mdfconv.scene.stored import MaterialProblem, ProblemKind
+from mdfconv.scene.texture.convert import Progress
+from mdfconv.scene.texture.rule import TextureRule
 
 # Tools that write libraries end at 1000, some at 10000: more is likely of another scale.
 _LARGEST_USUAL = 1e4
@@ -28,6 +39,10 @@ class To(StrEnum):
     shininess = "shininess"
 
 
+# What is converted, and what it becomes.
+_KEYWORDS = {To.roughness: (b"Ns", b"Pr"), To.shininess: (b"Pr", b"Ns")}
+
+
 @dataclass(frozen=True)
 class MtlMaterial:
     """One conversion of a material.
@@ -39,7 +54,7 @@ class MtlMaterial:
     line : int
         Line of the statement that was converted, counted from 1.
     shininess, roughness : float
-        Ns and Pr: the one that was converted, and its conversion.
+        Ns and Pr: the one that was converted, and its conversion; NaN for a mirror's exponent.
     rmse : float
         The error that the conversion leaves: the relative root mean square of `explain`.
     notes : tuple of str
@@ -78,7 +93,7 @@ class MtlConversion(FileConversion):
 
     Parameters
     ----------
-    materials : tuple of Material
+    materials : tuple of MtlMaterial
         What was converted, in the order of the library.
     textures : tuple of TextureStatement
         The textures of exponents (or of roughness, towards shininess) that it names.
@@ -88,14 +103,13 @@ class MtlConversion(FileConversion):
     textures: tuple[TextureStatement, ...]
 
 
-@dataclass
-class _MaterialBlock:
-    """What is known of one material while its library is converted."""
+@dataclass(frozen=True)
+class _ShinyBlock:
+    """The statements of one material that are converted; of several readers take the last."""
 
-    name: str
-    sources: list[Line] = field(default_factory=list)
-    targets: list[Line] = field(default_factory=list)
-    value: float | None = None
+    block: MaterialBlock
+    lines: list[Line]
+    value: float
 
 
 def convert_mtl(
@@ -104,7 +118,7 @@ def convert_mtl(
     *,
     metric: str | Metric = "environment",
     replace: bool = False,
-    texture_names: dict[str, str] | None = None,
+    texture_names: Mapping[str, str] | None = None,
 ) -> MtlConversion:
     """Convert the shininess of a material library to roughness, or back.
 
@@ -120,7 +134,7 @@ def convert_mtl(
         from all around, so by default that.
     replace : bool
         Drop the statement that was converted.
-    texture_names : dict, optional
+    texture_names : mapping, optional
         From files that ``map_Ns`` names to those that a ``map_Pr`` beside it is to name; for
         shininess the other way round. Without it such statements are problems.
 
@@ -140,24 +154,41 @@ def convert_mtl(
         raise MdfconvError("is a model, not a material library", f"its materials are in {library}")
     if to not in list(To):
         raise MdfconvError(f"a library is converted to roughness or shininess, not to '{to}'")
-    keywords = (b"Ns", b"Pr") if to == To.roughness else (b"Pr", b"Ns")
-    content = list(lines(data))
-    if not any(line.keyword for line in content) and any(map(_says_something, content)):
+    source, target = _KEYWORDS[To(to)]
+    lines, blocks = read_library(data)
+    if not any(line.keyword for line in lines) and any(map(_says_something, lines)):
         raise MdfconvError("is no material library: it has neither newmtl nor Ns nor Pr")
-    blocks, problems = _blocks(content, keywords)
-    materials = _converted(blocks, to, metric_named(metric))
-    texts = _edited(content, blocks, materials, keywords, replace=replace)
-    textures = _textures(content, blocks, b"map_" + keywords[0])
-    if texture_names is None:
-        problems += [(each.line, f"{each.keyword} {each.file} is a texture") for each in textures]
-    names = texture_names or {}
-    _set_textures(texts, content, textures, b"map_" + keywords[1], names, replace=replace)
+    sources, problems = _sources(blocks, source)
+    materials = _converted(sources, to, metric_named(metric))
+    # For a last line that nothing ends.
+    usual_end = next((line.end for line in lines if line.end), b"\n")
+    for each, material in zip(sources, materials, strict=True):
+        result = material.roughness if target == b"Pr" else material.shininess
+        if not np.isnan(result):
+            value = f"{result:.{_DIGITS[target]}g}".encode()
+            targets = each.block.having(target)
+            _set(target, value, each.lines, targets, usual_end, replace=replace)
+    textures = _textures(blocks, b"map_" + source)
+    for block, line, texture in textures:
+        if texture_names is None:
+            kind = ProblemKind.TEXTURE if source == b"Ns" else ProblemKind.OTHER
+            text = f"{texture.keyword} {texture.file} is a texture"
+            problems.append(MaterialProblem(line.number, text, kind))
+        elif texture.file in texture_names:
+            options, _ = split_options(line.value)
+            value = options + texture_names[texture.file].encode(errors="surrogateescape")
+            targets = block.having(b"map_" + target)[-1:]
+            _set(b"map_" + target, value, [line], targets, usual_end, replace=replace)
     return MtlConversion(
-        data=b"".join(texts),
-        notes=_replaced(content, texts, keywords[1]),
-        materials=tuple(filter(None, materials)),
-        textures=textures,
-        named=named_files(content),
+        data=b"".join([line.result for line in lines]),
+        notes=tuple(
+            (line.number, f"{line.shown} was replaced")
+            for line in lines
+            if line.keyword.removeprefix(b"map_") == target and line.value and line.is_changed
+        ),
+        materials=tuple(materials),
+        textures=tuple(texture for *_, texture in textures),
+        named=named_files(lines),
         problems=tuple(problems),
     )
 
@@ -167,161 +198,122 @@ def _says_something(line: Line) -> bool:
     return bool(line.before.partition(b"#")[0].strip())
 
 
-def texture_statements(data: bytes) -> tuple[TextureStatement, ...]:
-    """Return the textures of exponents, ``map_Ns``, that a library names."""
-    content = list(lines(data))
-    blocks, _ = _blocks(content, (b"Ns", b"Pr"))
-    return _textures(content, blocks, b"map_Ns")
+def _sources(
+    blocks: Sequence[MaterialBlock], keyword: bytes
+) -> tuple[list[_ShinyBlock], list[MaterialProblem]]:
+    """Return what is converted of the materials that have it, and what is not a number."""
+    sources, problems = [], []
+    for block in blocks:
+        numbers: list[tuple[Line, float]] = []
+        for line in block.having(keyword):
+            try:
+                numbers.append((line, number(line)))
+            except MdfconvError as error:
+                problems.append(MaterialProblem(line.number, str(error)))
+        if numbers:
+            sources.append(_ShinyBlock(block, [line for line, _ in numbers], numbers[-1][1]))
+    return sources, problems
 
 
-def _blocks(
-    lines: list[Line], keywords: tuple[bytes, bytes]
-) -> tuple[list[_MaterialBlock], list[tuple[int, str]]]:
-    """Return the materials, before the first ``newmtl`` one without a name, and problems."""
-    blocks, problems = [_MaterialBlock("")], []
-    for line in lines:
-        if line.keyword == b"newmtl":
-            blocks.append(_MaterialBlock(line.value.decode(errors="replace")))
-        block = blocks[line.material]
-        if line.keyword == keywords[1]:
-            block.targets.append(line)
-        elif line.keyword == keywords[0]:
-            problem, value = number(line.value, keywords[0])
-            if problem:
-                problems.append((line.number, problem))
-            else:
-                # Of several statements readers take the last.
-                block.sources.append(line)
-                block.value = value
-    return blocks, problems
-
-
-def _converted(blocks: list[_MaterialBlock], to: str, metric: Metric) -> list[MtlMaterial | None]:
-    """Return the conversion of each material; None where there is nothing to convert."""
-    values = np.array([np.nan if block.value is None else block.value for block in blocks])
-    results, rmse = np.full((2, values.size), np.nan)
-    # Pr 0 is a mirror, which has no exponent.
-    convertible = ~np.isnan(values) & ((values > 0) | (to == To.roughness))
+def _converted(sources: Sequence[_ShinyBlock], to: str, metric: Metric) -> list[MtlMaterial]:
+    """Return the conversion of each material."""
     # A library repeats its values.
-    unique, index = np.unique(values[convertible], return_inverse=True)
+    values, index = np.unique(np.array([each.value for each in sources]), return_inverse=True)
     if to == To.roughness:
-        answers = roughness_of(unique, metric)
-        errors = fit_error(unique, metric)
+        exponent, roughness = values, roughness_of(values, metric)
     else:
-        answers = exponent_of(unique, metric)
-        errors = fit_error(answers, metric)
-    results[convertible], rmse[convertible] = answers[index], errors[index]
+        exponent, roughness = exponent_of(values, metric), values
+    columns = exponent.tolist(), roughness.tolist(), fit_error(exponent, metric).tolist()
+    rows = list(zip(*columns, strict=True))
     return [
-        None if np.isnan(value) else _material(block, to, float(value), float(result), float(error))
-        for block, value, result, error in zip(blocks, values, results, rmse, strict=True)
+        _material(source, *rows[at]) for source, at in zip(sources, index.tolist(), strict=True)
     ]
 
 
-def _material(
-    block: _MaterialBlock, to: str, value: float, result: float, error: float
-) -> MtlMaterial:
-    pair = (value, result) if to == To.roughness else (result, value)
+def _material(source: _ShinyBlock, shininess: float, roughness: float, rmse: float) -> MtlMaterial:
     notes = []
-    if pair[0] == 0:
+    if shininess == 0:
         notes.append("Ns 0 is no highlight: Pr 1")
-    if pair[0] > _LARGEST_USUAL:
+    if shininess > _LARGEST_USUAL:
         notes.append("Ns beyond 10000")
-    if pair[1] == 0:
+    if roughness == 0:
         notes.append("Pr 0 is a mirror, which has no exponent: nothing written")
-    if len(block.sources) > 1:
-        notes.append(f"{len(block.sources)} statements: the last counts")
-    return MtlMaterial(block.name, block.sources[-1].number, *pair, error, tuple(notes))
+    if len(source.lines) > 1:
+        notes.append(f"{len(source.lines)} statements: the last counts")
+    line = source.lines[-1].number
+    return MtlMaterial(source.block.name, line, shininess, roughness, rmse, tuple(notes))
 
 
-def _usual_end(lines: list[Line]) -> bytes:
-    """Return what ends the lines of a library, for a last line that nothing ends."""
-    return next((line.end for line in lines if line.end), b"\n")
-
-
-def _edited(
-    lines: list[Line],
-    blocks: list[_MaterialBlock],
-    materials: list[MtlMaterial | None],
-    keywords: tuple[bytes, bytes],
-    *,
-    replace: bool,
-) -> list[bytes]:
-    """Return the lines, ends included, with the targets set; a dropped line is empty."""
-    texts = [line.content + line.end for line in lines]
-    default_end = _usual_end(lines)
-    for block, material in zip(blocks, materials, strict=True):
-        result = None if material is None else _result(material, keywords[1])
-        if result is None:
-            continue
-        last = block.sources[-1]
-        for line in block.targets:
-            texts[line.number - 1] = line.with_value(keywords[1], result) + line.end
-        if replace:
-            for line in block.sources:
-                texts[line.number - 1] = b""
-        if not block.targets:
-            new = last.with_value(keywords[1], result)
-            if not replace:
-                new = last.content + (last.end or default_end) + last.another(keywords[1], result)
-            texts[last.number - 1] = new + last.end
-    return texts
-
-
-def _replaced(lines: list[Line], texts: list[bytes], keyword: bytes) -> tuple[tuple[int, str], ...]:
-    """Return notes on the values of the target that somebody wrote and that are gone."""
-    return tuple(
-        (line.number, f"{line.keyword.decode()} {line.value.decode(errors='replace')} was replaced")
-        for line, text in zip(lines, texts, strict=True)
-        if line.keyword in (keyword, b"map_" + keyword)
-        and line.value
-        and text != line.content + line.end
-    )
-
-
-def _result(material: MtlMaterial, keyword: bytes) -> bytes | None:
-    """Return the number to write; None if there is none."""
-    value = material.roughness if keyword == b"Pr" else material.shininess
-    return None if np.isnan(value) else f"{value:.{_DIGITS[keyword]}g}".encode()
-
-
-def _textures(
-    lines: list[Line], blocks: list[_MaterialBlock], keyword: bytes
-) -> tuple[TextureStatement, ...]:
-    return tuple(
-        TextureStatement(
-            blocks[line.material].name,
-            keyword.decode(),
-            split_options(line.value)[1].decode(errors="surrogateescape"),
-            line.number,
-        )
-        for line in lines
-        if line.keyword == keyword and line.value
-    )
-
-
-def _set_textures(
-    texts: list[bytes],
-    lines: list[Line],
-    textures: tuple[TextureStatement, ...],
+def _set(
     keyword: bytes,
-    names: dict[str, str],
+    value: bytes,
+    sources: Sequence[Line],
+    targets: Sequence[Line],
+    usual_end: bytes,
     *,
     replace: bool,
 ) -> None:
-    """Name the converted textures, in a line of their own or in the place of the others."""
-    default_end = _usual_end(lines)
-    targets = {line.material: line for line in lines if line.keyword == keyword}
-    for texture in textures:
-        line = lines[texture.line - 1]
-        if texture.file not in names:
-            continue
-        options, _ = split_options(line.value)
-        value = options + names[texture.file].encode(errors="surrogateescape")
-        target = targets.get(line.material)
-        if target:
-            texts[target.number - 1] = target.with_value(keyword, value) + target.end
-        if replace:
-            texts[line.number - 1] = b"" if target else line.with_value(keyword, value) + line.end
-        elif not target:
-            new = (b"" if line.end else default_end) + line.another(keyword, value) + line.end
-            texts[line.number - 1] += new
+    """Give the targets a value; without any, put a line behind the last source, or in its place."""
+    last = sources[-1]
+    for line in targets:
+        line.replacement = line.with_value(keyword, value)
+    if replace:
+        for line in sources:
+            line.replacement = b""
+    if not targets and replace:
+        last.replacement = last.with_value(keyword, value)
+    elif not targets:
+        last.replacement = last.and_another(keyword, value, usual_end)
+
+
+def _textures(
+    blocks: Sequence[MaterialBlock], keyword: bytes
+) -> list[tuple[MaterialBlock, Line, TextureStatement]]:
+    """Return the statements of a keyword that name a texture."""
+    textures = []
+    for block in blocks:
+        for line in block.having(keyword):
+            if line.value:
+                file = split_options(line.value)[1].decode(errors="surrogateescape")
+                statement = TextureStatement(block.name, keyword.decode(), file, line.number)
+                textures.append((block, line, statement))
+    return textures
+
+
+def texture_rule(metric: Metric, exponent_max: float) -> TextureRule:
+    """Return how textures of exponents become roughness.
+
+    Raises
+    ------
+    MdfconvError
+        If the exponent of a white texel is illegal.
+    """
+    texels = f"{SHININESS}:exponent", ROUGHNESS
+    rule = TextureRule(*texels, metric=str(metric), exponent_max=exponent_max)
+    rule.endpoints()
+    return rule
+
+
+def convert_library_textures(
+    data: bytes, folder: TextureFolder, rule: TextureRule, progress: Progress
+) -> tuple[dict[str, str], list[MaterialProblem]]:
+    """Convert the textures of exponents that a library names.
+
+    Returns
+    -------
+    dict of str to str
+        Their new names, for `convert_mtl`.
+    list of MaterialProblem
+        What cannot be converted.
+    """
+    names: dict[str, str] = {}
+    problems: list[MaterialProblem] = []
+    textures = _textures(read_library(data)[1], b"map_Ns")
+    with progress("Textures", len(textures)) as advance:
+        for _, line, texture in textures:
+            try:
+                names[texture.file] = folder.convert(texture.file, rule, "Pr")
+            except MdfconvError as error:
+                problems.append(MaterialProblem(line.number, str(error)))
+            advance(1)
+    return names, problems

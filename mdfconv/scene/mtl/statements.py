@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 
-import numpy as np
+from mdfconv.errors import MdfconvError
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _BLANKS = b" \t"
@@ -23,7 +24,8 @@ _OPTION = re.compile(
 )
 
 
-class Line(NamedTuple):
+@dataclass(slots=True, eq=False)
+class Line:
     """A line of a library, in pieces if it is a statement that matters here.
 
     Parameters
@@ -35,8 +37,8 @@ class Line(NamedTuple):
         What ends it; nothing at the end of the library.
     number : int
         Counted from 1.
-    material : int
-        The number of ``newmtl`` statements up to it.
+    replacement : bytes or None
+        What is to stand in its place, ends included; None for the line itself.
     """
 
     before: bytes
@@ -46,62 +48,104 @@ class Line(NamedTuple):
     after: bytes
     end: bytes
     number: int
-    material: int
+    replacement: bytes | None = None
 
     @property
     def content(self) -> bytes:
         """The line without its end."""
         return self.before + self.keyword + self.gap + self.value + self.after
 
+    @property
+    def result(self) -> bytes:
+        """What is written, ends included."""
+        return self.content + self.end if self.replacement is None else self.replacement
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether what is written is something else."""
+        return self.replacement not in (None, self.content + self.end)
+
+    @property
+    def shown(self) -> str:
+        """Its keyword and its value."""
+        return f"{self.keyword.decode()} {self.value.decode(errors='replace')}"
+
     def with_value(self, keyword: bytes, value: bytes) -> bytes:
-        """Return the content with another keyword and value, all else kept."""
+        """Return the line with another keyword and value, all else kept."""
         if self.value:
-            return self.before + keyword + self.gap + value + self.after
+            return self.before + keyword + self.gap + value + self.after + self.end
         # A keyword alone, or with a comment close by.
         comment = self.after and (self.gap or b" ") + self.after
-        return self.before + keyword + b" " + value + comment
+        return self.before + keyword + b" " + value + comment + self.end
 
-    def another(self, keyword: bytes, value: bytes) -> bytes:
-        """Return the content of a new line like this one: its indentation, not its comment."""
-        return self.before.removeprefix(_BYTE_ORDER_MARK) + keyword + self.gap + value
+    def and_another(self, keyword: bytes, value: bytes, default_end: bytes) -> bytes:
+        """Return the line and a new one like it: of its indentation, without its comment."""
+        indentation = self.before.removeprefix(_BYTE_ORDER_MARK)
+        new = indentation + keyword + self.gap + value
+        return self.content + (self.end or default_end) + new + self.end
 
 
-def lines(data: bytes) -> Iterator[Line]:
-    """Yield the lines of a library."""
-    material = 0
-    for count, match in enumerate(_LINE.finditer(data), start=1):
-        if not match[0]:
+@dataclass(slots=True, eq=False)
+class MaterialBlock:
+    """The statements of one material, by their keywords.
+
+    Parameters
+    ----------
+    name : str
+        From its ``newmtl``; "" for statements before the first.
+    statements : dict of bytes to list of Line
+        In the order of the library.
+    """
+
+    name: str
+    statements: dict[bytes, list[Line]] = field(default_factory=dict)
+
+    def having(self, keyword: bytes) -> list[Line]:
+        """Return the statements of a keyword."""
+        return self.statements.get(keyword, [])
+
+
+def read_library(data: bytes) -> tuple[list[Line], list[MaterialBlock]]:
+    """Return the lines of a library and its materials, the first for what is before them."""
+    lines: list[Line] = []
+    blocks = [MaterialBlock("")]
+    for number, match in enumerate(_LINE.finditer(data), start=1):
+        content, end = match.groups()
+        if not (content or end):
             break
-        pieces = _pieces(match[1])
-        material += pieces[1] == b"newmtl"
-        yield Line(*pieces, match[2], count, material)
+        start = _START.match(content)
+        if not start:
+            lines.append(Line(content, b"", b"", b"", b"", end, number))
+            continue
+        before, keyword = start.groups()
+        rest = content[start.end() :]
+        gap = rest[: len(rest) - len(rest.lstrip(_BLANKS))]
+        text, mark, comment = rest[len(gap) :].partition(b"#")
+        value = text.rstrip(_BLANKS)
+        after = text[len(value) :] + mark + comment
+        line = Line(before, keyword, gap, value, after, end, number)
+        lines.append(line)
+        if keyword == b"newmtl":
+            blocks.append(MaterialBlock(value.decode(errors="replace")))
+        blocks[-1].statements.setdefault(keyword, []).append(line)
+    return lines, blocks
 
 
-def _pieces(content: bytes) -> tuple[bytes, bytes, bytes, bytes, bytes]:
-    start = _START.match(content)
-    if not start:
-        return content, b"", b"", b"", b""
-    rest = content[start.end() :]
-    gap = rest[: len(rest) - len(rest.lstrip(_BLANKS))]
-    text, mark, comment = rest[len(gap) :].partition(b"#")
-    value = text.rstrip(_BLANKS)
-    return start[1], start[2], gap, value, text[len(value) :] + mark + comment
+def number(line: Line) -> float:
+    """Return the value of an Ns or a Pr; raise `MdfconvError` if it is none."""
+    shown = f"{line.keyword.decode()} '{line.value.decode(errors='replace')}'"
+    if not _NUMBER.match(line.value):
+        raise MdfconvError(f"{shown} is not a number")
+    value = float(line.value)
+    if not 0 <= value < math.inf or (line.keyword == b"Pr" and value > 1):
+        legal = "0 ≤ Pr ≤ 1" if line.keyword == b"Pr" else "Ns ≥ 0"
+        raise MdfconvError(f"{shown} is outside {legal}")
+    return value
 
 
-def number(text: bytes, keyword: bytes) -> tuple[str, float]:
-    """Return what is wrong with the value of an Ns or a Pr, "" if nothing, and the value."""
-    shown = f"{keyword.decode()} '{text.decode(errors='replace')}'"
-    if not _NUMBER.match(text):
-        return f"{shown} is not a number", np.nan
-    value = float(text)
-    if not 0 <= value < np.inf or (keyword == b"Pr" and value > 1):
-        return f"{shown} is outside {'0 ≤ Pr ≤ 1' if keyword == b'Pr' else 'Ns ≥ 0'}", np.nan
-    return "", value
-
-
-def named_files(content: Iterable[Line]) -> list[str]:
+def named_files(lines: Iterable[Line]) -> list[str]:
     """Return the textures that a library names, in order."""
-    statements = (_TEXTURE.match(line.content) for line in content)
+    statements = (_TEXTURE.match(line.content) for line in lines)
     values = [match[1].partition(b"#")[0].rstrip(_BLANKS) for match in statements if match]
     return [split_options(value)[1].decode(errors="replace") for value in values]
 

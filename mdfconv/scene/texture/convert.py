@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,18 +14,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mdfconv.errors import MdfconvError, MdfconvWarning
-from mdfconv.output.files import StagedFiles, staged_files
+from mdfconv.output.files import staged_files
 from mdfconv.scene.texture.images import (
-    PictureForm,
+    EXR,
+    TIFF,
+    PictureFile,
     check_files,
     check_output,
     find_channels,
     open_picture,
     written,
 )
-from mdfconv.scene.texture.rule import TextureRule
+from mdfconv.scene.texture.rule import TextureRule, ValueConverter
 from mdfconv.scene.texture.texel_map import BLOCK, TexelMap, TextureReport
-from mdfconv.scene.texture.values import ValueConverter
 
 Progress: TypeAlias = Callable[[str, int], AbstractContextManager[Callable[[int], None]]]
 
@@ -52,7 +53,7 @@ def convert_texture(
     -------
     numpy.ndarray
         The converted texels, same shape. Texels that have no answer are treated as
-        `mdfconv.scene.texture.values.ValueConverter` says; NaN stays NaN.
+        `mdfconv.scene.texture.rule.ValueConverter` says; NaN stays NaN.
 
     Raises
     ------
@@ -81,14 +82,14 @@ def convert_texture(
     step = _rows_a_block(rows.shape[1])
     for start in range(0, len(rows), step):
         results[start : start + step] = convert(rows[start : start + step])
-    for note in convert.report().notes(ends=False)[:1]:
+    for note in convert.report().notes(limits=False)[:1]:
         warnings.warn(note, MdfconvWarning, stacklevel=2)
     return converted
 
 
 def convert_texture_file(
-    source: str | Path,
-    output: str | Path,
+    source: str | Path | PictureFile,
+    output: str | Path | PictureFile,
     rule: TextureRule,
     *,
     channel: str | None = None,
@@ -97,7 +98,7 @@ def convert_texture_file(
     lossy: bool = False,
     max_pixels: int | None = None,
     progress: Progress | None = None,
-    files: StagedFiles | None = None,
+    fill: Callable[[Path], Path] | None = None,
 ) -> TextureReport:
     """Convert a texture in a PNG, TIFF, TGA or OpenEXR file, and write it to another.
 
@@ -107,7 +108,7 @@ def convert_texture_file(
 
     Parameters
     ----------
-    source, output : str or Path
+    source, output : str, Path or PictureFile
         The files; their names end in what they hold: .png, .tif, .tiff, .tga or .exr. EXR becomes
         EXR, a TIFF of floats a TIFF, and the others become any of the others. An existing output
         is replaced, whole or not at all.
@@ -126,8 +127,8 @@ def convert_texture_file(
         The largest picture that is decoded; 2²⁷ (134217728) if not given.
     progress : callable, optional
         ``progress(description, total)``, a context that yields what advances by so many rows.
-    files : StagedFiles, optional
-        What takes the output, to be placed together with other files.
+    fill : callable, optional
+        Returns where the output is written for now, to be placed together with other files.
 
     Returns
     -------
@@ -140,29 +141,38 @@ def convert_texture_file(
     MdfconvError
         If the rule, the source or the output cannot be; nothing is then written.
     """
-    source, output = Path(source), Path(output)
+    source, output = (
+        each if isinstance(each, PictureFile) else PictureFile(Path(each))
+        for each in (source, output)
+    )
     ValueConverter(rule)  # names are wrong more often than files
     source_form, form = check_files(source, output, lossy=lossy)
-    upright = form not in (PictureForm.tiff, PictureForm.exr)
     with (
-        nullcontext(files) if files else staged_files(lambda _: False) as taking,
+        nullcontext(fill) if fill else _staged() as place,
         open_picture(
-            source, source_form, lossy=lossy, max_pixels=max_pixels, upright=upright
+            source, source_form, lossy=lossy, max_pixels=max_pixels, upright=form not in (TIFF, EXR)
         ) as picture,
     ):
-        channels = find_channels(source, picture.names, channel)
-        dtype = picture.dtype_of(channels)
+        channels = find_channels(picture, channel)
         width = picture.width if dither else None
+        dtype = picture.dtype_of(channels)
         convert = TexelMap(rule, dtype, depth, width, channels=len(channels))
         check_output(picture, form, convert.dtype)
         with (
-            written(taking.fill(output), form, picture, convert.dtype) as write,
+            written(place(output.path), form, picture, convert.dtype) as write,
             progress("rows", picture.height) if progress else nullcontext(_ignore) as advance,
         ):
             for block in picture.blocks(BLOCK):
                 write(_converted(block, channels, convert))
                 advance(len(block))
         return replace(convert.report(), remark=picture.remark())
+
+
+@contextmanager
+def _staged() -> Iterator[Callable[[Path], Path]]:
+    """Give a place beside a file's own, which it gets in the end."""
+    with staged_files(lambda _: False) as files:
+        yield files.fill
 
 
 def _converted(block: NDArray[Any], channels: tuple[int, ...], convert: TexelMap) -> NDArray[Any]:
@@ -193,50 +203,20 @@ def _ignore(rows: int) -> None:
 
 
 def convert_texture_bytes(
-    data: bytes, suffix: str, rule: TextureRule, channel: str | None = None
-) -> bytes:
-    """Convert the content of a picture file.
-
-    Parameters
-    ----------
-    data : bytes
-        The content.
-    suffix : str
-        What the file's name ends in, such as ``".png"``.
-    rule, channel
-        As for `convert_texture_file`.
-
-    Returns
-    -------
-    bytes
-        The content of the converted file.
-
-    Raises
-    ------
-    MdfconvError
-        As `convert_texture_file`.
-    """
-    return converted_and_report(data, suffix, rule, channel)[0]
-
-
-def converted_and_report(
     data: bytes, suffix: str, rule: TextureRule, channel: str | None = None, *, lossy: bool = False
 ) -> tuple[bytes, TextureReport]:
-    """Convert the content of a picture file as `convert_texture_bytes`, and say what was done.
+    """Convert the content of a picture file, whose name ends in a suffix such as ``".png"``.
 
     With `lossy` a JPEG is taken, too, and becomes a PNG.
     """
     with TemporaryDirectory() as folder:
-        source = Path(folder) / f"texture{suffix}"
-        target = Path(folder) / f"converted{'.png' if lossy else suffix}"
-        source.write_bytes(data)
+        source = PictureFile(Path(folder) / f"texture{suffix}", "the texture")
+        target = PictureFile(Path(folder) / f"converted{'.png' if lossy else suffix}", "the result")
+        source.path.write_bytes(data)
         try:
-            report = convert_texture_file(source, target, rule, channel=channel, lossy=lossy)
-        except MdfconvError as error:
-            # The temporary file's name says nothing.
-            reason, hint = (
-                text.replace(str(source), "the texture").replace(str(target), "the result")
-                for text in (error.reason, error.hint)
+            report = convert_texture_file(
+                source, target, rule, channel=channel, lossy=lossy, fill=Path
             )
-            raise MdfconvError(reason, hint, argument=error.argument) from None
-        return target.read_bytes(), report
+        except OSError as error:
+            raise MdfconvError(f"cannot write {target}: {error.strerror or error}") from None
+        return target.path.read_bytes(), report

@@ -6,9 +6,14 @@ import struct
 import zlib
 from math import ceil
 from pathlib import Path
+from typing import TypeAlias
 
+# Why a file is no texture, and what helps.
+Reason: TypeAlias = tuple[str, str]
+PALETTE = ("has a palette: its texels are indices, not values", "save it as grey or RGB")
+SEVERAL_PICTURES = ("holds several pictures, of which only one would be kept", "split it")
 # Chunks that say how a PNG's texels are meant, and stay true when some are converted.
-_PNG_KEPT = (b"cHRM", b"gAMA", b"iCCP", b"sRGB", b"cICP", b"pHYs")
+_TEXEL_CHUNKS = (b"cHRM", b"gAMA", b"iCCP", b"sRGB", b"cICP", b"pHYs")
 _PNG_HEADER = 33  # bytes, of the signature and the first chunk
 _PNG_END = b"IEND\xaeB`\x82"
 _TGA_END = b"TRUEVISION-XFILE.\0"
@@ -16,32 +21,18 @@ _PALETTE = 3
 _LINEAR_GAMMA = 100000
 _LARGEST_PROFILE = 1 << 26
 # Numbers of TIFF's tags.
-_BITS, _COMPRESSION, _ROWS, _PLANES, _EXTRA = 258, 259, 278, 284, 338
-_WIDTH, _HEIGHT, _SAMPLES, _TILE_WIDTH, _TILE_HEIGHT = 256, 257, 277, 322, 323
+_WIDTH, _HEIGHT, _BITS, _COMPRESSION, _SAMPLES, _ROWS = 256, 257, 258, 259, 277, 278
+_PLANES, _TILE_WIDTH, _TILE_HEIGHT, _EXTRA = 284, 322, 323, 338
 _PLACES = ((273, 279), (324, 325))  # of strips and of tiles: offsets, and bytes
 _WHOLE_NUMBERS = {1: "B", 3: "H", 4: "I", 16: "Q"}  # by the number of their type
+# Values of the tags of compression, planes and further channels.
 _UNCOMPRESSED, _SEPARATE, _ASSOCIATED = 1, 2, 1
-_TGA_BITS = {
-    2: (24, 32),
-    3: (8,),
-    10: (24, 32),
-    11: (8,),
-}  # by kind: colour and grey, plain and RLE
+# By the kind of a TGA: colour and grey, plain and RLE.
+_TGA_BITS = {2: (24, 32), 3: (8,), 10: (24, 32), 11: (8,)}
 
 
 class PngHeader:
-    """The chunks of a PNG file before its texels.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    ValueError
-        If a chunk is damaged.
-    """
+    """The chunks of a PNG file before its texels; ValueError if one is damaged."""
 
     def __init__(self, path: Path) -> None:
         self._chunks: dict[bytes, bytes] = {}
@@ -55,17 +46,17 @@ class PngHeader:
                     raise ValueError(f"the sum of the chunk {head[4:].decode('latin-1')} is wrong")
                 self._chunks[head[4:]] = data
 
-    def reason(self) -> tuple[str, str] | None:
+    def reason(self) -> Reason | None:
         """Return why it is no texture, and what helps; None if it is one."""
         *_, bits, kind = struct.unpack(">IIBB", self._chunks.get(b"IHDR", bytes(10))[:10])
         if kind == _PALETTE:
-            return "has a palette: its texels are indices, not values", "save it as grey or RGB"
+            return PALETTE
         if bits not in (8, 16):
             return f"has {bits} bits a sample, not 8 or 16", ""
         if b"tRNS" in self._chunks:
             return "makes one value transparent, which would be another", "save it with alpha"
         if b"acTL" in self._chunks:
-            return "holds several pictures, of which only one would be kept", "split it"
+            return SEVERAL_PICTURES
         return None
 
     def gamma(self) -> str:
@@ -86,10 +77,10 @@ class PngHeader:
         except zlib.error:
             return b""
 
-    def kept(self) -> bytes:
+    def texel_chunks(self) -> bytes:
         """Return the chunks that belong into the converted file."""
         return b"".join(
-            png_chunk(name, self._chunks[name]) for name in _PNG_KEPT if name in self._chunks
+            png_chunk(name, self._chunks[name]) for name in _TEXEL_CHUNKS if name in self._chunks
         )
 
 
@@ -101,10 +92,7 @@ def png_chunk(name: bytes, data: bytes) -> bytes:
 def replace_chunks(path: Path, chunks: bytes) -> None:
     """Give a PNG file these chunks instead of those between its header and its texels.
 
-    Raises
-    ------
-    OSError
-        If it is not whole, of which OpenImageIO says nothing where the disk is full.
+    OSError if it is not whole, of which OpenImageIO says nothing where the disk is full.
     """
     content = path.read_bytes()
     texels, end = 0, 8
@@ -120,25 +108,18 @@ def replace_chunks(path: Path, chunks: bytes) -> None:
 def check_tga(path: Path, texels: int) -> None:
     """Check that an uncompressed TGA of so many bytes is whole.
 
-    Raises
-    ------
-    OSError
-        If it is not, of which OpenImageIO says nothing where the disk is full.
+    OSError if not, of which OpenImageIO says nothing where the disk is full.
     """
     content = path.read_bytes()
     if len(content) < texels or not content.endswith(_TGA_END):
         raise OSError("it could not be written as a whole")
 
 
-def tiff_reason(path: Path) -> tuple[str, str] | None:
+def tiff_reason(path: Path) -> Reason | None:
     """Return why a TIFF is no texture, and what helps; None if it is one.
 
-    libtiff takes what follows in the file for rows that lack, so these are looked for.
-
-    Raises
-    ------
-    ValueError
-        If the file is damaged.
+    libtiff takes what follows in the file for rows that lack, so these are looked for: ValueError
+    if they do, or if the directory is damaged.
     """
     try:
         tags = _tiff_tags(path)
@@ -208,7 +189,7 @@ def _tiff_tags(path: Path) -> dict[int, tuple[int, ...]]:
     return tags
 
 
-def tga_reason(path: Path) -> tuple[str, str] | None:
+def tga_reason(path: Path) -> Reason | None:
     """Return why a TGA is no texture, and what helps; None if it is one."""
     with path.open("rb") as file:
         start = file.read(18)

@@ -8,7 +8,7 @@ import sys
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from enum import StrEnum
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,10 @@ from numpy.typing import NDArray
 
 from mdfconv.errors import MdfconvError
 from mdfconv.scene.texture.headers import (
+    PALETTE,
+    SEVERAL_PICTURES,
     PngHeader,
+    Reason,
     check_tga,
     png_chunk,
     replace_chunks,
@@ -33,62 +36,51 @@ def quiet_streams() -> Iterator[None]:
     for stream in streams.values():
         if stream is not None:
             stream.flush()
-    kept = [(number, os.dup(number)) for number, stream in streams.items() if stream is not None]
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    copies = [(number, os.dup(number)) for number, stream in streams.items() if stream is not None]
+    null = os.open(os.devnull, os.O_WRONLY)
     try:
-        for number, _ in kept:
-            os.dup2(nowhere, number)
+        for number, _ in copies:
+            os.dup2(null, number)
         yield
     finally:
-        for number, copy in kept:
+        for number, copy in copies:
             os.dup2(copy, number)
             os.close(copy)
-        os.close(nowhere)
+        os.close(null)
 
 
 _GREY = ("y", "l", "grey", "gray")
 
 
-def find_channels(path: Path, names: Sequence[str], wanted: str | None) -> tuple[int, ...]:
-    """Return which channels are to be converted.
+def find_channels(picture: Picture, chosen: str | None) -> tuple[int, ...]:
+    """Return which channels of a picture are to be converted.
 
-    Parameters
-    ----------
-    path : Path
-        The picture, for messages.
-    names : sequence of str
-        Its channels.
-    wanted : str or None
-        One name, several with commas between, or letters that are names each, as ``"rgb"``;
-        None for the only one. Case does not matter where it does not tell two apart, and grey
-        has several names.
-
-    Raises
-    ------
-    MdfconvError
-        If the picture has no such channel, or several and none was chosen.
+    Chosen is one name, several with commas between, or letters that are names each, as ``"rgb"``;
+    None for the only one. Case does not matter where it does not tell two apart, and grey has
+    several names.
     """
+    source, names = picture.source, picture.names
     known = ", ".join(name.lower() if len(name) == 1 else name for name in names)
-    if wanted is None:
+    if chosen is None:
         if len(names) != 1:
             raise MdfconvError(
-                f"{path} has the channels {known}", "choose one channel", argument="channel"
+                f"{source} has the channels {known}", "choose one channel", argument="channel"
             )
         return (0,)
-    whole = _find(names, wanted)
-    parts = wanted.split(",") if "," in wanted else list(wanted)
-    found = [whole] if whole is not None else [_find(names, part) for part in parts]
-    indices = tuple(index for index in found if index is not None)
-    if not indices or len(set(indices)) != len(found):
-        raise MdfconvError(f"{path} has no channel '{wanted}'", f"its channels are {known}")
+    whole = _find(names, chosen)
+    parts = chosen.split(",") if "," in chosen else list(chosen)
+    places = [whole] if whole is not None else [_find(names, part) for part in parts]
+    indices = tuple(index for index in places if index is not None)
+    if not indices or len(set(indices)) != len(places):
+        raise MdfconvError(f"{source} has no channel '{chosen}'", f"its channels are {known}")
     return indices
 
 
-def _find(names: Sequence[str], wanted: str) -> int | None:
-    if wanted in names:
-        return names.index(wanted)
-    keys = [_key(name) for name in names]
-    return keys.index(_key(wanted)) if keys.count(_key(wanted)) == 1 else None
+def _find(names: Sequence[str], name: str) -> int | None:
+    if name in names:
+        return names.index(name)
+    keys = [_key(each) for each in names]
+    return keys.index(_key(name)) if keys.count(_key(name)) == 1 else None
 
 
 def _key(name: str) -> str:
@@ -98,111 +90,117 @@ def _key(name: str) -> str:
 
 # A small file can claim any size, and what is interlaced or turned is held as a whole.
 MAX_PIXELS = 1 << 27
-ACCEPT_LOSSES = "take the original, or accept the losses"
+_ACCEPT_LOSSES = "take the original, or accept the losses"
 _LOSSLESS = ("", "none", "rle", "lzw", "zip", "zips", "piz", "packbits", "lzma", "zstd", "htj2k")
 # Integers up to here are exact where OpenImageIO takes them for floats.
 _LARGEST_MIXED = 1 << 24
 # A prediction from the left: nearly as small as trying all of them, in a fourth of the time.
-_PNG = {"png:filter": 16, "png:compressionLevel": 4}
+_PNG_SETTINGS = {"png:filter": 16, "png:compressionLevel": 4}
+# Beyond it a PNG cannot say how many texels a metre has.
 _PNG_LIMIT = 1 << 31
 # By the number of TIFF's orientation: swap the axes, then reverse columns and rows.
 _TURNS = {
-    **{2: (False, True, False), 3: (False, True, True), 4: (False, False, True)},
-    **{5: (True, False, False), 6: (True, True, False), 7: (True, True, True)},
-    **{8: (True, False, True)},
+    number: (number > 4, number in (2, 3, 6, 7), number in (3, 4, 7, 8)) for number in range(2, 9)
 }
-
-
-class PictureForm(StrEnum):
-    """The forms of image files."""
-
-    png = "PNG"
-    tiff = "TIFF"
-    exr = "OpenEXR"
-    tga = "TGA"
-    jpeg = "JPEG"
-
-
-# OpenImageIO's names: of forms, and of types.
-_FORMATS = {
-    **{
-        PictureForm.png: "png",
-        PictureForm.tiff: "tiff",
-        PictureForm.exr: "openexr",
-        PictureForm.tga: "targa",
-    },
-    PictureForm.jpeg: "jpeg",
+# OpenImageIO's names of types.
+_DTYPES = {
+    "uint8": "uint8",
+    "uint16": "uint16",
+    "half": "float16",
+    "float": "float32",
+    "double": "float64",
 }
-_NAMES = {
-    **{"uint8": "uint8", "uint16": "uint16"},
-    **{"float16": "half", "float32": "float", "float64": "double"},
-}
-_DTYPES = {name: dtype for dtype, name in _NAMES.items()}
+_NAMES = {dtype: name for name, dtype in _DTYPES.items()}
 # Of the attributes of a picture those that are about its texels; the writer of TIFF makes the
 # vertical resolution from the horizontal one and the aspect.
-_KEPT = (*("XResolution", "YResolution", "ResolutionUnit", "PixelAspectRatio", "Orientation"),)
-# What the forms hold that hold no other channels.
-_BANDS = {PictureForm.png: ("Y", "YA", "RGB", "RGBA"), PictureForm.tga: ("Y", "RGB", "RGBA")}
-_SIGNATURES = {
-    b"\x89PNG\r\n\x1a\n": PictureForm.png,
-    **dict.fromkeys((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"), PictureForm.tiff),
-    b"\x76\x2f\x31\x01": PictureForm.exr,
-    b"\xff\xd8\xff": PictureForm.jpeg,
-}
-_ENDINGS = {
-    **{
-        ".png": PictureForm.png,
-        ".tif": PictureForm.tiff,
-        ".tiff": PictureForm.tiff,
-        ".exr": PictureForm.exr,
-    },
-    **{".tga": PictureForm.tga, ".jpg": PictureForm.jpeg, ".jpeg": PictureForm.jpeg},
-}
+_ATTRIBUTES = ("XResolution", "YResolution", "ResolutionUnit", "PixelAspectRatio", "Orientation")
+
+
+@dataclass(frozen=True)
+class PictureForm:
+    """A form of image files."""
+
+    name: str
+    # Its name in OpenImageIO.
+    library: str
+    endings: tuple[str, ...]
+    # What files of it start with; none if there is nothing to tell them by.
+    signatures: tuple[bytes, ...] = ()
+    # The channels that it holds; none if it holds any.
+    bands: tuple[str, ...] = ()
+    # Why a file of it is no texture, if it is none.
+    reason: Callable[[Path], Reason | None] = lambda _: None
+
+    def __str__(self) -> str:
+        return self.name
+
+
+PNG = PictureForm(
+    *("PNG", "png", (".png",), (b"\x89PNG\r\n\x1a\n",), ("Y", "YA", "RGB", "RGBA")),
+    lambda path: PngHeader(path).reason(),
+)
+TIFF = PictureForm(
+    *("TIFF", "tiff", (".tif", ".tiff"), (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")),
+    reason=tiff_reason,
+)
+TGA = PictureForm("TGA", "targa", (".tga",), (), ("Y", "RGB", "RGBA"), tga_reason)
+EXR = PictureForm("OpenEXR", "openexr", (".exr",), (b"\x76\x2f\x31\x01",))
+JPEG = PictureForm("JPEG", "jpeg", (".jpg", ".jpeg"), (b"\xff\xd8\xff",))
+_FORMS = (PNG, TIFF, TGA, EXR, JPEG)
+
+
+def _form_named(path: Path) -> PictureForm | None:
+    """Return the form that a file's name says."""
+    return next((form for form in _FORMS if path.suffix.lower() in form.endings), None)
+
+
+@dataclass(frozen=True)
+class PictureFile:
+    """A file, and what messages call it."""
+
+    path: Path
+    name: str = ""
+
+    def __str__(self) -> str:
+        return self.name or str(self.path)
 
 
 def check_files(
-    source: Path, output: Path, *, lossy: bool = False
+    source: PictureFile, output: PictureFile, *, lossy: bool = False
 ) -> tuple[PictureForm, PictureForm]:
-    """Return the forms of two files, if a texture can go from one to the other.
-
-    Raises
-    ------
-    MdfconvError
-        If the source is not what its name says or no texture, if the output's name is of a form
-        that cannot hold it, or if both are the same file.
-    """
-    source_form = _form_of(source)
-    output_form = _ENDINGS.get(output.suffix.lower())
-    if source_form is PictureForm.jpeg and not lossy:
+    """Return the forms of two files; refuse those between which no texture can go."""
+    form = _form_of(source)
+    output_form = _form_named(output.path)
+    if form is JPEG and not lossy:
         raise MdfconvError(
             f"{source} is a JPEG, which has altered the values (8-bit blocks with losses, made "
             "for gamma-encoded pictures)",
-            ACCEPT_LOSSES,
+            _ACCEPT_LOSSES,
             argument="lossy",
         )
-    if output_form is PictureForm.jpeg:
+    if output_form is JPEG:
         raise MdfconvError(f"{output}: a JPEG would alter the values", "write .png or .tif")
     if output_form is None:
         raise MdfconvError(f"{output} does not end in .png, .tif, .tiff, .tga or .exr")
-    if (source_form is PictureForm.exr) != (output_form is PictureForm.exr):
-        endings = ".exr" if source_form is PictureForm.exr else ".png or .tif"
-        kind = "floats" if source_form is PictureForm.exr else "integers"
+    if (form is EXR) != (output_form is EXR):
+        kind, endings = ("floats", ".exr") if form is EXR else ("integers", ".png or .tif")
         raise MdfconvError(
             f"{source} holds {kind}, which {output_form} does not", f"write {endings}"
         )
-    if output == source or (output.exists() and output.samefile(source)):
+    place = output.path
+    if place == source.path or (place.exists() and place.samefile(source.path)):
         raise MdfconvError(f"{output} is the same file as {source}", "write to another one")
-    return source_form, output_form
+    return form, output_form
 
 
-def _form_of(source: Path) -> PictureForm:
+def _form_of(source: PictureFile) -> PictureForm:
     """Return the form of a file's content, if its name does not say another."""
-    with reading(source), source.open("rb") as file:
+    with reading(source), source.path.open("rb") as file:
         start = file.read(8)
-    form = next((form for key, form in _SIGNATURES.items() if start.startswith(key)), None)
-    named = _ENDINGS.get(source.suffix.lower())
-    if form is None and named is PictureForm.tga and start:
-        return named  # which has no signature
+    form = next((form for form in _FORMS if start.startswith(form.signatures)), None)
+    named = _form_named(source.path)
+    if form is None and named is TGA and start:
+        return TGA  # which has no signature
     if form is None:
         raise MdfconvError(f"{source} is no PNG, TIFF, TGA or OpenEXR file")
     if named not in (None, form):
@@ -213,20 +211,12 @@ def _form_of(source: Path) -> PictureForm:
 class Picture:
     """An open picture that is read some rows at a time.
 
-    Parameters
-    ----------
-    path : Path
-        The file, for messages.
-    form : Form
-        What it holds.
-    file : OpenImageIO.ImageInput
-        The same, open.
-    upright : bool
-        Whether its orientation is to be applied, not kept: the rows come as they are looked at.
+    If it is to be upright its orientation is applied, not kept: the rows come as they are looked
+    at.
     """
 
-    def __init__(self, path: Path, form: PictureForm, file: Any, *, upright: bool) -> None:
-        self.path, self.form, self._file = path, form, file
+    def __init__(self, source: PictureFile, form: PictureForm, file: Any, *, upright: bool) -> None:
+        self.source, self.form, self._file = source, form, file
         self.spec = file.spec()
         self.names: tuple[str, ...] = self.spec.channelnames
         self.kinds = [str(self.spec.channelformat(at)) for at in range(self.spec.nchannels)]
@@ -239,22 +229,16 @@ class Picture:
             self.width, self.height = self.height, self.width
 
     def dtype_of(self, channels: Sequence[int]) -> np.dtype[Any]:
-        """Return the type of the texels of some channels.
-
-        Raises
-        ------
-        MdfconvError
-            If they are of several types, or of one that no texture has.
-        """
+        """Return the type of the texels of some channels, which must have the same."""
         for channel in channels:
             if self.kinds[channel] not in _DTYPES:
                 raise MdfconvError(
-                    f"{self.path}: channel {self.names[channel]} holds integers, not floats"
+                    f"{self.source}: channel {self.names[channel]} holds integers, not floats"
                 )
         kinds = {self.kinds[channel] for channel in channels}
         if len(kinds) > 1:
             raise MdfconvError(
-                f"{self.path}: the channels are of the types {' and '.join(sorted(kinds))}",
+                f"{self.source}: the channels are of the types {' and '.join(sorted(kinds))}",
                 "convert one after the other",
             )
         return np.dtype(_DTYPES[kinds.pop()])
@@ -286,7 +270,7 @@ class Picture:
                 integers = self._decode(top, bottom, channel, channel + 1, "uint")
                 if integers.max() >= _LARGEST_MIXED:
                     raise MdfconvError(
-                        f"{self.path} has floats and, in channel {self.names[channel]}, integers "
+                        f"{self.source} has floats and, in channel {self.names[channel]}, integers "
                         f"above {_LARGEST_MIXED}, which would lose digits",
                         "split it",
                     )
@@ -296,66 +280,58 @@ class Picture:
         """Return some rows of the channels from `first` on and before `last`."""
         spec = self.spec
         rows = spec.y + top, spec.y + bottom
-        with reading(self.path):
+        with reading(self.source):
             if spec.tile_width:
                 columns = spec.x, spec.x + spec.width
-                found = self._file.read_tiles(*columns, *rows, 0, 1, first, last, kind)
+                texels = self._file.read_tiles(*columns, *rows, 0, 1, first, last, kind)
             else:
-                found = self._file.read_scanlines(*rows, 0, first, last, kind)
+                texels = self._file.read_scanlines(*rows, 0, first, last, kind)
             fault = self._file.geterror()
-            if found is None or fault:
+            if texels is None or fault:
                 raise ValueError(fault)
-        return np.asarray(found).reshape(bottom - top, spec.width, last - first)
+        return np.asarray(texels).reshape(bottom - top, spec.width, last - first)
 
     def profile(self) -> bytes:
         """Return the colour profile; empty if there is none."""
-        if self.form is PictureForm.png:
-            return PngHeader(self.path).profile()
+        if self.form is PNG:
+            return PngHeader(self.source.path).profile()
         profile = self.spec.getattribute("ICCProfile")
         return b"" if profile is None else np.asarray(profile).tobytes()
 
     def remark(self) -> str:
         """Return what the user must know of how the texels were taken; empty if nothing."""
-        with reading(self.path):
-            found = PngHeader(self.path).gamma() if self.form is PictureForm.png else ""
+        with reading(self.source):
+            what = PngHeader(self.source.path).gamma() if self.form is PNG else ""
             if self.profile():
                 name = self.spec.get_string_attribute("ICCProfile:profile_description")
-                found = f"a colour profile ({name})" if name else "a colour profile"
-        return found and (
-            f"{self.path} has {found}, which is not for data: its texels were taken as they are"
+                what = f"a colour profile ({name})" if name else "a colour profile"
+        return what and (
+            f"{self.source} has {what}, which is not for data: its texels were taken as they are"
         )
 
 
 @contextmanager
 def open_picture(
-    path: Path, form: PictureForm, *, lossy: bool, max_pixels: int | None, upright: bool
+    source: PictureFile, form: PictureForm, *, lossy: bool, max_pixels: int | None, upright: bool
 ) -> Iterator[Picture]:
-    """Open a picture.
-
-    Raises
-    ------
-    MdfconvError
-        If it is damaged, too large, or of a kind whose values are no roughness.
-    """
+    """Open a picture; refuse what is damaged, too large, or of a kind that is no roughness."""
     import OpenImageIO
 
     config = OpenImageIO.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)  # or it would multiply by alpha
-    with reading(path):
-        _refuse(path, _REASONS[form](path) if form in _REASONS else None)
-        file = OpenImageIO.ImageInput.open(str(path), config)
+    with reading(source):
+        _refuse(source, form.reason(source.path))
+        file = OpenImageIO.ImageInput.open(str(source.path), config)
         fault = OpenImageIO.geterror()
-        if file is None or file.format_name() != _FORMATS[form]:
+        if file is None or file.format_name() != form.library:
             raise ValueError(fault)
     try:
-        with reading(path):
-            picture = Picture(path, form, file, upright=upright)
+        with reading(source):
+            picture = Picture(source, form, file, upright=upright)
             _check_size(picture, max_pixels)
-            _refuse(path, _reason(picture, lossy=lossy))
+            _refuse(source, _reason(picture, lossy=lossy))
             if file.seek_subimage(1, 0) or file.seek_subimage(0, 1):
-                _refuse(
-                    path, ("holds several pictures, of which only one would be kept", "split it")
-                )
+                _refuse(source, SEVERAL_PICTURES)
             file.seek_subimage(0, 0)
             file.geterror()
         yield picture
@@ -363,36 +339,29 @@ def open_picture(
         file.close()
 
 
-def _refuse(path: Path, reason: tuple[str, str] | None) -> None:
+def _refuse(source: PictureFile, reason: Reason | None) -> None:
     if reason:
-        raise MdfconvError(f"{path} {reason[0]}", reason[1])
+        raise MdfconvError(f"{source} {reason[0]}", reason[1])
 
 
-_REASONS: dict[PictureForm, Callable[[Path], tuple[str, str] | None]] = {
-    PictureForm.png: lambda path: PngHeader(path).reason(),
-    PictureForm.tiff: tiff_reason,
-    PictureForm.tga: tga_reason,
-}
-
-
-def _reason(picture: Picture, *, lossy: bool) -> tuple[str, str] | None:
+def _reason(picture: Picture, *, lossy: bool) -> Reason | None:
     """Return why an open picture cannot be taken, and what helps; None if it can."""
     spec = picture.spec
     space = spec.get_string_attribute("tiff:ColorSpace")
     if spec.deep:
         return "holds deep texels, which are no texture", ""
     if space == "palette":
-        return "has a palette: its texels are indices, not values", "save it as grey or RGB"
+        return PALETTE
     if space:
         return f"holds {space} colours, not grey or RGB(A)", ""
-    if picture.form is not PictureForm.exr and picture.kinds[0] not in _DTYPES:
+    if picture.form is not EXR and picture.kinds[0] not in _DTYPES:
         return f"holds texels of the type {picture.kinds[0]}", "save it with 16 bits or as floats"
     # OpenImageIO turns this round for 8 bits.
     white_is_zero = spec.get_int_attribute("tiff:PhotometricInterpretation", 1) == 0
     if white_is_zero and picture.kinds[0] != "uint8":
         return "counts from white (0) to black", "save it with black as zero"
-    if picture.form is PictureForm.tiff and not lossy and not _is_lossless(spec):
-        return "is compressed with losses, which has altered the values", ACCEPT_LOSSES
+    if picture.form is TIFF and not lossy and not _is_lossless(spec):
+        return "is compressed with losses, which has altered the values", _ACCEPT_LOSSES
     return None
 
 
@@ -405,7 +374,7 @@ def _check_size(picture: Picture, max_pixels: int | None) -> None:
     width, height = picture.width, picture.height
     if width * height > limit:
         raise MdfconvError(
-            f"{picture.path} has {width}×{height} = {width * height} pixels, more than the "
+            f"{picture.source} has {width}×{height} = {width * height} pixels, more than the "
             f"{limit} that are safe to decode unasked",
             f"allow {width * height} pixels",
             argument="max_pixels",
@@ -413,7 +382,7 @@ def _check_size(picture: Picture, max_pixels: int | None) -> None:
 
 
 @contextmanager
-def reading(path: Path) -> Iterator[None]:
+def reading(source: PictureFile) -> Iterator[None]:
     """Turn what damaged files raise into one line."""
     try:
         with quiet_streams():
@@ -421,54 +390,42 @@ def reading(path: Path) -> Iterator[None]:
     except MdfconvError:
         raise
     except MemoryError:
-        raise MdfconvError(f"{path} does not fit into the memory") from None
+        raise MdfconvError(f"{source} does not fit into the memory") from None
     except OSError as error:
-        raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
+        raise MdfconvError(f"cannot read {source}: {error.strerror}") from None
     except UnicodeDecodeError:  # a fault with a name that is none
-        raise MdfconvError(f"{path} is damaged") from None
+        raise MdfconvError(f"{source} is damaged") from None
     except (ValueError, LookupError, ArithmeticError, RuntimeError, struct.error) as error:
         reason = (str(error).strip().splitlines() or ["its header does not add up"])[0]
-        raise MdfconvError(f"{path} is damaged, incomplete or unusual: {reason}") from None
+        raise MdfconvError(f"{source} is damaged, incomplete or unusual: {reason}") from None
 
 
 def check_output(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> None:
-    """Refuse a form that cannot hold what a picture becomes.
-
-    Raises
-    ------
-    MdfconvError
-        If it cannot.
-    """
-    if form in (PictureForm.tiff, PictureForm.exr):
+    """Refuse a form that cannot hold what a picture becomes."""
+    if form in (TIFF, EXR):
         return
     if dtype.kind == "f":
-        raise MdfconvError(f"{picture.path} holds floats, which {form} does not", "write .tif")
-    if form is PictureForm.tga and dtype != np.uint8:
+        raise MdfconvError(f"{picture.source} holds floats, which {form} does not", "write .tif")
+    if form is TGA and dtype != np.uint8:
         raise MdfconvError("TGA holds 8 bits, not 16", "write .png or .tif")
-    if "".join(picture.names) not in _BANDS[form]:
+    if "".join(picture.names) not in form.bands:
         known = ", ".join(picture.names)
         raise MdfconvError(
-            f"{picture.path} has the channels {known}, which {form} does not hold", "write .tif"
+            f"{picture.source} has the channels {known}, which {form} does not hold", "write .tif"
         )
 
 
 @contextmanager
 def written(
-    beside: Path, form: PictureForm, picture: Picture, dtype: np.dtype[Any]
+    path: Path, form: PictureForm, picture: Picture, dtype: np.dtype[Any]
 ) -> Iterator[Callable[[NDArray[Any]], None]]:
-    """Give what takes the rows of a converted picture, for a file that is there and empty.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Give what takes the rows of a converted picture, for a file that is there and empty."""
     import OpenImageIO
 
-    with reading(picture.path):  # whose texts may be none
+    with reading(picture.source):  # whose texts may be none
         spec = _output_spec(picture, form, dtype)
-    file: Any = OpenImageIO.ImageOutput.create(_FORMATS[form])
-    if not file.open(str(beside), spec):
+    file: Any = OpenImageIO.ImageOutput.create(form.library)
+    if not file.open(str(path), spec):
         raise OSError(file.geterror())
     top = spec.y
 
@@ -491,42 +448,42 @@ def written(
             closed = file.close()
     if not closed:
         raise OSError(file.geterror())
-    if form is PictureForm.png:
-        replace_chunks(beside, _png_chunks(picture))
-    if form is PictureForm.tga:
-        check_tga(beside, spec.image_bytes())
+    if form is PNG:
+        replace_chunks(path, _png_chunks(picture))
+    if form is TGA:
+        check_tga(path, spec.image_bytes())
 
 
 def _output_spec(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> Any:
     """Return what a converted file says of itself."""
     import OpenImageIO
 
-    given = picture.spec
-    if form is PictureForm.exr:
-        spec = given.copy()
+    original = picture.spec
+    if form is EXR:
+        spec = original.copy()
         # The rows come from the top.
         spec.attribute("openexr:lineOrder", "increasingY")
-        if not _is_lossless(given):
+        if not _is_lossless(original):
             spec.attribute("compression", "zip")
     else:
         spec = OpenImageIO.ImageSpec(
-            picture.width, picture.height, given.nchannels, _NAMES[dtype.name]
+            picture.width, picture.height, original.nchannels, _NAMES[dtype.name]
         )
-        spec.channelnames, spec.alpha_channel = given.channelnames, given.alpha_channel
+        spec.channelnames, spec.alpha_channel = original.channelnames, original.alpha_channel
         spec.attribute("oiio:UnassociatedAlpha", 1)
-        spec.attribute("compression", "none" if form is PictureForm.tga else "zip")
-    if not given.get_string_attribute("DateTime"):
+        spec.attribute("compression", "none" if form is TGA else "zip")
+    if not original.get_string_attribute("DateTime"):
         spec.attribute("DateTime", "")  # or it would be now
-    if form is PictureForm.png:
-        for name, value in _PNG.items():
+    if form is PNG:
+        for name, value in _PNG_SETTINGS.items():
             spec.attribute(name, value)
-    if form is PictureForm.tiff:
+    if form is TIFF:
         spec.attribute("tiff:half", 1)
         if profile := picture.profile():
             kind = OpenImageIO.TypeDesc(f"uint8[{len(profile)}]")
             spec.attribute("ICCProfile", kind, np.frombuffer(profile, np.uint8))
-        for attribute in given.extra_attribs:
-            if attribute.name in _KEPT:
+        for attribute in original.extra_attribs:
+            if attribute.name in _ATTRIBUTES:
                 spec.attribute(attribute.name, attribute.type, attribute.value)
     return spec
 
@@ -536,8 +493,8 @@ def _png_chunks(picture: Picture) -> bytes:
 
     OpenImageIO calls all texels sRGB there, and ends the process over a faulty profile.
     """
-    if picture.form is PictureForm.png:
-        return PngHeader(picture.path).kept()
+    if picture.form is PNG:
+        return PngHeader(picture.source.path).texel_chunks()
     chunks, spec = b"", picture.spec
     if profile := picture.profile():
         chunks += png_chunk(b"iCCP", b"ICC profile\0\0" + zlib.compress(profile))

@@ -1,18 +1,22 @@
-"""What a texture holds, and what it is to hold."""
+"""What a texture holds and what it is to hold, as a function of every stored value."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdfconv.distributions import distribution
 from mdfconv.distributions.dialects import dialects_of
 from mdfconv.distributions.endpoint import Endpoint, endpoint, endpoints
-from mdfconv.distributions.evaluation import Array
-from mdfconv.distributions.parameter import Encoding, Parameter
+from mdfconv.distributions.evaluation import Array, Mask
+from mdfconv.distributions.parameter import ROUGHNESS, Encoding, Parameter
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import metric_named
 from mdfconv.registry import unknown_name
+from mdfconv.scene.stored import Outcome, StoredConverter, StoredResults
 
 # MTL's shininess runs to 1000; 2^13 is the scale of Lazarov 2013.
 EXPONENT_MAX = 1000.0
@@ -48,6 +52,9 @@ class TextureRule:
         Getting More Physical in Call of Duty: Black Ops II (SIGGRAPH 2013).
     gamma : float, optional
         The second parameter, for source and target that have one; its default if not given.
+    factor : float
+        What the program multiplies v by before it is read, as glTF's roughnessFactor: above 0 and
+        at most 1.
     """
 
     source: str | Endpoint
@@ -57,6 +64,7 @@ class TextureRule:
     exponent_max: float = EXPONENT_MAX
     log2_scale: float = LOG2_SCALE
     gamma: float | None = None
+    factor: float = 1.0
 
     def endpoints(self) -> tuple[Endpoint, Endpoint]:
         """Return source and target, as `mdfconv.convert` takes them.
@@ -74,6 +82,8 @@ class TextureRule:
                 f"the scale of log2 is above 0 and at most {_LARGEST_SCALE:g}, "
                 f"not {self.log2_scale:g}"
             )
+        if not 0 < self.factor <= 1:
+            raise MdfconvError(f"a factor is above 0 and at most 1, not {self.factor:g}")
         return endpoints(self._endpoint(self.source), self._endpoint(self.target), self.gamma)
 
     def _endpoint(self, name: str | Endpoint) -> Endpoint:
@@ -100,13 +110,11 @@ class TextureRule:
         """Return how a texture stores a parameter that scenes use beyond 1."""
         largest, scale, symbol = self.exponent_max, self.log2_scale, parameter.symbol
         # The roughest and the smoothest that fit: N from 1 up.
-        linear = Parameter(
-            "exponent",
-            "v",
-            (min(1 / largest, 1.0), 1.0),
-            0.0,
-            1.0,
-            upper_closed=True,
+        linear = replace(
+            ROUGHNESS.stored,
+            name="exponent",
+            symbol="v",
+            typical=(min(1 / largest, 1.0), 1.0),
             larger_is_smoother=parameter.larger_is_smoother,
         )
         logarithmic = replace(linear, name="log2", typical=(0.0, 1.0), lower_closed=True)
@@ -133,3 +141,110 @@ def _log2(exponent: Array) -> Array:
     with np.errstate(divide="ignore"):
         logarithm: Array = np.log2(exponent)
     return logarithm
+
+
+# Texels among which the roughest with a result is looked for: those of sixteen bits.
+_GRID = 65536
+# Texels of which the legal ones are looked at, one half among them.
+_EIGHT_BIT_GRID, _HALF = 257, 0.5
+# Beyond 0..1 by less is rounding; a sixteen-bit texel is 1.5e-5.
+_ROUNDING = 1e-9
+
+
+class ValueConverter:
+    """A rule as a function of stored values, which has an answer for every number.
+
+    A value outside 0..1 is clamped into it first. The ends that are no legal parameter, the
+    perfect mirror (α = 0) and the uniform lobe (N = 0), become the target's smoothest and
+    roughest values. Where the method has no answer, a surface rougher than any that has one takes
+    the answer of the roughest, one that is smoother is a mirror. Results are clamped to 0..1.
+    NaN stays NaN.
+    """
+
+    def __init__(self, rule: TextureRule) -> None:
+        source, target = rule.endpoints()
+        # Texels are exact down to the smallest exponent.
+        self._convert = StoredConverter(
+            source,
+            target,
+            metric_named(rule.metric),
+            rule.method,
+            uniform_below=np.finfo(float).tiny,
+        )
+        self._factor = rule.factor
+        scale = f"{' of' if source.encoding else ':'} {rule.factor:g} v" if rule.factor != 1 else ""
+        self.labels = source.label + scale, target.label
+        self.keeps = self._convert.keeps
+
+    def __call__(self, texels: Array) -> tuple[Array, NDArray[np.uint8]]:
+        """Return stored values of the target, from 0 to 1 or NaN, and what became of each.
+
+        `Outcome.BEYOND` is what was clamped to 0..1.
+        """
+        clipped = np.clip(texels, 0, 1)
+        parameter, result, outcome = self._converted(clipped)
+        value = np.clip(result, 0, 1)
+        outcome[outcome == Outcome.BEYOND] = Outcome.CONVERTED
+        with np.errstate(invalid="ignore"):
+            outcome[np.abs(result - value) > _ROUNDING] = Outcome.BEYOND
+        if outcome.any():
+            self._complete(clipped, np.isnan(parameter), value, outcome)
+        outcome[clipped != texels] = Outcome.OUTSIDE
+        nan = np.isnan(texels)
+        value[nan] = np.nan
+        outcome[nan] = Outcome.NAN
+        return value, outcome
+
+    def _converted(self, texels: Array) -> StoredResults:
+        return self._convert(texels if self._factor == 1 else texels * self._factor)
+
+    def _complete(
+        self, texels: Array, illegal: Mask, value: Array, outcome: NDArray[np.uint8]
+    ) -> None:
+        """Give what has no result the nearest there is."""
+        smoothest = self._convert.smoothest_result
+        if illegal.any():
+            with np.errstate(invalid="ignore"):
+                smooth = self._roughness(texels[illegal]) < self._middle
+            value[illegal] = np.where(smooth, smoothest, 1 - smoothest)
+            outcome[illegal] = np.where(smooth, Outcome.MIRROR, Outcome.UNIFORM)
+        missing = outcome == Outcome.UNANSWERED
+        if missing.any():
+            roughest, result = self._roughest
+            rougher = self._roughness(texels[missing]) > self._roughness(roughest)
+            value[missing] = np.where(rougher, result, smoothest)
+
+    @cached_property
+    def _roughest(self) -> tuple[Array, float]:
+        """The roughest of 65536 texels for which there is a result, and that result."""
+        texels = np.linspace(0, 1, _GRID)
+        parameter, result, _ = self._converted(texels)
+        converted = ~np.isnan(parameter) & ~np.isnan(result)
+        if not converted.any():
+            raise MdfconvError(
+                f"{self._convert.method.name} has no answer for any texel from {self.labels[0]} "
+                f"to {self.labels[1]}"
+            )
+        texels, result = texels[converted], result[converted]
+        index = int(np.argmax(self._roughness(texels)))
+        return texels[index], float(np.clip(result[index], 0, 1))
+
+    @cached_property
+    def _middle(self) -> float:
+        """A roughness in the middle of those that the source takes."""
+        rough = self._roughness(self._legal(_GRID))
+        return 0.5 * float(rough.min() + rough.max()) if rough.size else 0.5
+
+    def takes_ends(self) -> bool:
+        """Return whether illegal texels are at the end for which a texel below or above ½ is."""
+        legal = self._legal(_EIGHT_BIT_GRID)
+        return legal.size > 0 and bool(legal[0] <= _HALF <= legal[-1])
+
+    def _legal(self, size: int) -> Array:
+        """Return those of so many texels from 0 to 1 that the source takes."""
+        texels = np.linspace(0, 1, size)
+        return texels[~np.isnan(self._convert.source.decode_legal(texels * self._factor))]
+
+    def _roughness(self, texels: Array) -> Array:
+        """Return numbers that rise with the roughness."""
+        return texels if self._convert.smoothest == 0 else 1 - texels

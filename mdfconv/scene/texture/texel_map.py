@@ -1,4 +1,4 @@
-"""Error diffusion."""
+"""Texels of one type converted: through a table, dithered, and counted for the report."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from mdfconv.errors import MdfconvError
-from mdfconv.scene.texture.rule import TextureRule
-from mdfconv.scene.texture.values import Outcome, ValueConverter
+from mdfconv.scene.stored import Outcome
+from mdfconv.scene.texture.rule import TextureRule, ValueConverter
 
 # Rows that are rounded together, of a narrow picture: the memory grows with their square.
 _ROWS = 256
-_RIGHT, _BELOW_LEFT, _BELOW, _BELOW_RIGHT = (np.float32(part / 16) for part in (7, 3, 5, 1))
+# Shares of the neighbours: right, and below to the left, in the middle and to the right.
+_SHARES = tuple(np.float32(part / 16) for part in (7, 3, 5, 1))
 
 
 class ErrorDiffusion:
@@ -25,11 +26,6 @@ class ErrorDiffusion:
     right below. It is at most half a level, and only what leaves the picture is lost: the sums
     before and after differ by at most half a level for each texel of the last row and the two
     edges.
-
-    Parameters
-    ----------
-    width : int
-        Texels a row.
     """
 
     def __init__(self, width: int) -> None:
@@ -38,17 +34,7 @@ class ErrorDiffusion:
         self._above = np.zeros(width + 2, np.float32)
 
     def __call__(self, levels: NDArray[np.float32]) -> NDArray[np.uint8]:
-        """Round the next rows of a picture.
-
-        Parameters
-        ----------
-        levels : numpy.ndarray of float32, shape (rows, width)
-            Values in units of the level, from 0 to 255.
-
-        Returns
-        -------
-        numpy.ndarray of uint8, shape (rows, width)
-        """
+        """Round the next rows of a picture, in units of the level from 0 to 255."""
         if levels.size == 0:
             return levels.astype(np.uint8)
         step = max(_ROWS, self._width)
@@ -80,12 +66,8 @@ class ErrorDiffusion:
             last = min(rows, step // 2 + 1)
             one, two, three = error[step + 2], error[step + 1], error[step]
             value, share = sheared[step, first:last], part[first:last]
-            for source, weight in (
-                (one[first + 1 : last + 1], _RIGHT),
-                (one[first:last], _BELOW_LEFT),
-                (two[first:last], _BELOW),
-                (three[first:last], _BELOW_RIGHT),
-            ):
+            above = one[first:last], two[first:last], three[first:last]
+            for source, weight in zip((one[first + 1 : last + 1], *above), _SHARES, strict=True):
                 np.multiply(source, weight, out=share)
                 value += share
             np.rint(value, out=share)
@@ -95,30 +77,15 @@ class ErrorDiffusion:
 
 
 BLOCK = 1 << 19  # texels converted at a time
-BINS = 256
-DEPTHS = (8, 16)
+BINS = 256  # of a histogram
+DEPTHS = (8, 16)  # bits of an integer texel
 # Types of which every value fits into a table.
 _TABLED = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float16))
 _TYPES = (*_TABLED, np.dtype(np.float32), np.dtype(np.float64))
 
 
 def result_type(dtype: np.dtype[Any], depth: int | None, dither: bool) -> np.dtype[Any]:
-    """Return the type of the converted texels.
-
-    Parameters
-    ----------
-    dtype : numpy.dtype
-        That of the texture.
-    depth : int or None
-        Bits of an integer texel, 8 or 16; None keeps the type.
-    dither : bool
-        Whether the errors of rounding are to be diffused.
-
-    Raises
-    ------
-    MdfconvError
-        If it is no type of a texture, or cannot have the depth or be dithered.
-    """
+    """Return the type of the converted texels, of so many bits; None keeps that of a texture."""
     native = dtype.newbyteorder("=")
     if native not in _TYPES:
         names = ", ".join(known.name for known in _TYPES)
@@ -163,18 +130,18 @@ class TextureReport:
     after: NDArray[np.int64]
     remark: str = ""
 
-    def notes(self, *, ends: bool = True) -> list[str]:
-        """Return what the user must know; `ends` includes mirrors and the roughest."""
+    def notes(self, *, limits: bool = True) -> list[str]:
+        """Return what the user must know; `limits` includes mirrors and the roughest."""
         source, target = self.source, self.target
         texts = {
             Outcome.MIRROR: f"perfect mirrors in {source}: they get the smoothest {target}",
             Outcome.UNIFORM: f"as rough as can be in {source}: they get the roughest {target}",
             Outcome.UNANSWERED: "without an answer by the method, clamped to the nearest",
-            Outcome.CLAMPED: f"clamped: their results are outside 0..1 in {target}",
+            Outcome.BEYOND: f"clamped: their results are outside 0..1 in {target}",
             Outcome.OUTSIDE: f"clamped: they are outside 0..1 in {source}",
             Outcome.NAN: "NaN, and left so",
         }
-        if not ends:
+        if not limits:
             del texts[Outcome.MIRROR], texts[Outcome.UNIFORM]
         counts = [
             f"{self.outcomes[outcome]} of {self.texels} texels are {text}"
@@ -184,26 +151,61 @@ class TextureReport:
         return [*counts, self.remark] if self.remark else counts
 
 
+def draw_histograms(report: TextureReport, title: str, dpi: int = 150) -> bytes:
+    """Return a PNG of the stored values before and after, as shares of the texels."""
+    from mdfconv.output.figures import PAGE, encoded, line_style, new_figure
+
+    figure = new_figure(*PAGE)
+    panels = figure.subplots(2, 1, sharex=True, sharey=True)
+    edges = np.linspace(0, 1, BINS + 1)
+    histograms = (report.source, report.before), (report.target, report.after)
+    for panel, (name, counts) in zip(panels, histograms, strict=True):
+        color = line_style(name.partition(":")[0])["color"]
+        shares = 100 * counts / max(1, counts.sum())
+        panel.stairs(shares, edges, fill=True, color=color, alpha=0.35)
+        panel.stairs(shares, edges, color=color, linewidth=1)
+        panel.set_ylabel("texels [%]")
+        panel.set_xlabel(f"stored value, {name}")
+        panel.tick_params(labelbottom=True)
+    # A texture of few values has spikes; a root shows what is between them.
+    panels[0].set_yscale("function", functions=(np.sqrt, np.square))
+    panels[0].set_xlim(0, 1)
+    panels[0].set_title(title)
+    return encoded(figure, dpi=dpi)
+
+
+class _ValueTable:
+    """What becomes of every value of a short type, and how often each was met."""
+
+    def __init__(self, convert: ValueConverter, dtype: np.dtype[Any]) -> None:
+        self._key = np.dtype(f"u{dtype.itemsize}")
+        self._texels = np.arange(1 << 8 * dtype.itemsize).astype(self._key).view(dtype)
+        stored = self._texels.astype(np.float64)
+        if dtype.kind == "u":
+            stored /= stored[-1]
+        self.values, self._outcomes = convert(stored)
+        self._counts = np.zeros(stored.size, np.int64)
+
+    def keys(self, texels: NDArray[Any]) -> NDArray[Any]:
+        """Return the places of texels in the table, and count them."""
+        keys = texels.view(self._key)
+        self._counts += np.bincount(keys.ravel(), minlength=self._counts.size)
+        return keys
+
+    def outcomes(self) -> NDArray[np.int64]:
+        """Return how often there was each outcome."""
+        return _sums(self._outcomes, self._counts, len(Outcome))
+
+    def histogram(self) -> NDArray[np.int64]:
+        """Return the histogram of the texels that were met."""
+        known = ~np.isnan(self._texels)
+        return _sums(_bins(self._texels[known]), self._counts[known], BINS)
+
+
 class TexelMap:
     """A rule on texels of one type; integers and halves go through a table.
 
-    Parameters
-    ----------
-    rule : TextureRule
-        What to convert, and how.
-    dtype : numpy.dtype
-        Type of the texels.
-    depth : int or None
-        Bits of the result, 8 or 16; None keeps the type.
-    width : int or None
-        Texels a row, to diffuse the errors of rounding; None rounds each texel for itself.
-    channels : int
-        How many channels are converted, whose errors do not mix.
-
-    Raises
-    ------
-    MdfconvError
-        If the rule or the type cannot be converted.
+    With the width of a row the errors of rounding are diffused, in each channel by themselves.
     """
 
     def __init__(
@@ -221,63 +223,50 @@ class TexelMap:
         self._dither = [] if width is None else [ErrorDiffusion(width) for _ in range(channels)]
         self._outcomes = np.zeros(len(Outcome), np.int64)
         self._before, self._after = (np.zeros(BINS, np.int64) for _ in range(2))
-        self._table = self._tabled() if self.source_dtype in _TABLED else None
+        tabled = self.source_dtype in _TABLED
+        self._table = _ValueTable(self._convert, self.source_dtype) if tabled else None
+        self._results = self._stored(self._table.values) if self._table else np.empty(0)
 
     def __call__(self, block: NDArray[Any], channel: int = 0) -> NDArray[Any]:
         """Convert some texels, any shape; with dither the next rows of a channel."""
         texels = block.astype(self.source_dtype, copy=False)
-        if self._table is None:
-            values, outcomes = self._convert(texels.astype(np.float64))
-            converted: NDArray[Any] = values.astype(self.dtype)
-            self._outcomes += np.bincount(outcomes.ravel(), minlength=len(Outcome))
-            self._before += _histogram(texels)
-        else:
-            key = texels.view(f"u{self.source_dtype.itemsize}")
-            self._counts += np.bincount(key.ravel(), minlength=self._counts.size)
-            converted = self._table[key]
+        if self._table:
+            converted = self._results[self._table.keys(texels)]
             if self._dither:
                 converted = self._dither[channel](converted)
+        else:
+            values, outcomes = self._convert(texels.astype(np.float64))
+            converted = self._stored(values)
+            self._outcomes += np.bincount(outcomes.ravel(), minlength=len(Outcome))
+            self._before += _histogram(texels)
         self._after += _histogram(converted)
         return converted
 
-    def report(self) -> TextureReport:
-        """Return what was done so far."""
-        outcomes, before = self._outcomes, self._before
-        if self._table is not None:
-            outcomes = np.zeros_like(self._outcomes)
-            np.add.at(outcomes, self._table_outcomes, self._counts)
-            before = self._histogram_of_counts()
-        return TextureReport(
-            *self._convert.labels,
-            self._convert.keeps,
-            texels=int(outcomes.sum()),
-            outcomes=dict(zip(Outcome, outcomes.tolist(), strict=True)),
-            before=before,
-            after=self._after.copy(),
-        )
-
-    def _tabled(self) -> NDArray[Any]:
-        """Return the answer for every value of the type, in levels if it is dithered."""
-        every = np.arange(1 << 8 * self.source_dtype.itemsize).astype(
-            f"u{self.source_dtype.itemsize}"
-        )
-        self._counts = np.zeros(every.size, np.int64)
-        stored = every.view(self.source_dtype).astype(np.float64)
-        if self.source_dtype.kind == "u":
-            stored /= every[-1]
-        values, self._table_outcomes = self._convert(stored)
+    def _stored(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return results in their type, or in its levels if they are to be dithered."""
         if self.dtype.kind == "f":
             return values.astype(self.dtype)
         levels = values * np.iinfo(self.dtype).max
         return levels.astype(np.float32) if self._dither else np.rint(levels).astype(self.dtype)
 
-    def _histogram_of_counts(self) -> NDArray[np.int64]:
-        every = np.arange(self._counts.size).astype(f"u{self.source_dtype.itemsize}")
-        texels = every.view(self.source_dtype)
-        known = ~np.isnan(texels)
-        before = np.zeros(BINS, np.int64)
-        np.add.at(before, _bins(texels[known]), self._counts[known])
-        return before
+    def report(self) -> TextureReport:
+        """Return what was done so far."""
+        outcomes = self._table.outcomes() if self._table else self._outcomes
+        return TextureReport(
+            *self._convert.labels,
+            self._convert.keeps,
+            texels=int(outcomes.sum()),
+            outcomes=dict(zip(Outcome, outcomes.tolist(), strict=True)),
+            before=self._table.histogram() if self._table else self._before.copy(),
+            after=self._after.copy(),
+        )
+
+
+def _sums(places: NDArray[Any], counts: NDArray[np.int64], size: int) -> NDArray[np.int64]:
+    """Return sums of counts by their places."""
+    sums = np.zeros(size, np.int64)
+    np.add.at(sums, places, counts)
+    return sums
 
 
 def _histogram(texels: NDArray[Any]) -> NDArray[np.int64]:

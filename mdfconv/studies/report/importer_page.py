@@ -15,11 +15,12 @@ from mdfconv.formula import SearchProblem, cheapest
 from mdfconv.output.figures import PAGE, encoded, new_figure
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text, markdown_text, rounded_rows
-from mdfconv.scene.encodings import EXPONENTS, encoding_records
 from mdfconv.scene.shininess import (
+    EXPONENTS,
     IMPORTERS,
     ROUGHNESS,
     SHININESS,
+    encoding_records,
     error_of,
     importer_roughness,
     roughness_of,

@@ -12,7 +12,7 @@ from mdfconv.conversion import list_methods, method_named
 from mdfconv.conversion.explanation import remaining_error
 from mdfconv.conversion.methods import Method
 from mdfconv.distributions import Distribution, one_parameter_distributions
-from mdfconv.distributions.equivalence import exact_route
+from mdfconv.distributions.endpoint import exact_route
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.output.files import file_bytes

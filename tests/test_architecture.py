@@ -1,17 +1,21 @@
-"""The house: imports go down only, and what is true of a distribution stands in its class."""
+"""The house: imports go down only, and what is true of a distribution stands in its class.
+
+Each test goes through all modules, and names everything that is wrong at once.
+"""
 
 import ast
+import re
+from collections import defaultdict
 from pathlib import Path
-
-import pytest
 
 import mdfconv
 
 PACKAGE = Path(mdfconv.__file__).parent
-# From the roof to the ground; a module imports from its own floor and those beneath.
+# From the roof to the ground; a module imports from its own floor and those beneath. Above the
+# product are only the command line and what studies it.
 FLOORS = (
     "cli", "studies", "scene", "render", "recommend", "formula", "measured", "conversion", "brdf",
-    "fitting", "light", "output", "distributions", "timing", "registry", "errors",
+    "fitting", "light", "output", "timing", "distributions", "registry", "errors",
 )  # fmt: skip
 # What speaks to a terminal stands on the roof, alone.
 TERMINAL = {"typer", "rich", "click"}
@@ -31,7 +35,6 @@ ABOUT_PARTICULAR_ONES = {
     "cli/compare_command.py": "the names of BRDFs",
     "measured/report.py": "the forms in which files store a lobe",
     "measured/brdf_fit.py": "Schlick's Fresnel factor",
-    "distributions/dialects.py": "whose parameter a program stores",
     "scene/light.py": "what lights are described by",
     "scene/mitsuba/convert.py": "the target by default, of those that Mitsuba has",
     "scene/mitsuba/scene.py": "Mitsuba's distributions",
@@ -42,12 +45,25 @@ ABOUT_PARTICULAR_ONES = {
     "cli/plot_error_command.py": "the paper's reference",
     "cli/fit_table_command.py": "the paper's reference",
 }
-SOURCES = sorted(PACKAGE.rglob("*.py"))
-MODULES = [str(path.relative_to(PACKAGE)) for path in SOURCES]
+# Modules outside the command line that may quote options, each with the reason.
+QUOTES_OPTIONS = {
+    "scene/material_files.py": "where the command line says that files go",
+    "measured/analysis.py": "limits that are read from the command line",
+    "measured/readers/text.py": "how the command line says what angles are of",
+    "measured/report.py": "by which metric the page converts",
+}
+# The pages of studies say by which commands they are made.
+QUOTING_WING = "studies/"
+OPTION = re.compile(r"(?<![\w-])--[a-z]")
+FACES = {"__init__.py", "__main__.py"}
+TREES = {
+    str(path.relative_to(PACKAGE)): ast.parse(path.read_text(encoding="utf-8"))
+    for path in sorted(PACKAGE.rglob("*.py"))
+}
 
 
-def tree_of(module):
-    return ast.parse((PACKAGE / module).read_text())
+def room_of(module):
+    return module.split("/")[0].removesuffix(".py")
 
 
 def imported(tree):
@@ -60,52 +76,95 @@ def imported(tree):
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-def floor_of(name):
-    return FLOORS.index(name.split(".")[1])
+def imported_rooms(tree):
+    """Return the rooms of the package that a module imports from."""
+    names = (name.split(".") for name in imported(tree))
+    return {parts[1] for parts in names if parts[0] == "mdfconv" and len(parts) > 1} & set(FLOORS)
 
 
-@pytest.mark.parametrize("module", [name for name in MODULES if "/" in name])
-def test_imports_go_down(module):
-    own = FLOORS.index(module.split("/")[0])
-    for name in imported(tree_of(module)):
-        parts = name.split(".")
-        if parts[0] == "mdfconv" and len(parts) > 1 and parts[1] in FLOORS:
-            assert floor_of(name) >= own, f"{module} imports {name}"
-        if parts[0] in TERMINAL:
-            assert FLOORS[own] == "cli", f"{module} imports {name}"
-
-
-def test_every_room_has_a_floor():
-    rooms = {name.split("/")[0].removesuffix(".py") for name in MODULES}
-    assert rooms - {"__init__", "__main__"} == set(FLOORS)
-
-
-def docstrings(tree):
-    """Return the string nodes that are documentation."""
+def texts(tree):
+    """Yield the strings of a module that are not documentation."""
     kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
-    return {
+    documentation = {
         id(node.body[0].value)
         for node in ast.walk(tree)
         if isinstance(node, kinds) and node.body and isinstance(node.body[0], ast.Expr)
     }
+    for node in ast.walk(tree):
+        is_text = isinstance(node, ast.Constant) and isinstance(node.value, str)
+        if is_text and id(node) not in documentation:
+            yield node.value
 
 
-@pytest.mark.parametrize("module", [n for n in MODULES if not n.startswith("distributions/")])
-def test_no_module_elsewhere_names_a_distribution(module):
+def test_every_room_has_a_floor():
+    assert {room_of(module) for module in TREES if module not in FACES} == set(FLOORS)
+
+
+def test_imports_go_down():
+    climbing = [
+        f"{module} imports from {room}"
+        for module, tree in TREES.items()
+        if module not in FACES
+        for room in sorted(imported_rooms(tree))
+        if FLOORS.index(room) < FLOORS.index(room_of(module))
+    ]
+    assert climbing == []
+
+
+def test_the_product_imports_no_study():
+    """Only the command line, whose commands some studies are, knows of the other wing."""
+    studying = [
+        module
+        for module, tree in TREES.items()
+        if room_of(module) not in ("cli", "studies") and "studies" in imported_rooms(tree)
+    ]
+    assert studying == []
+
+
+def test_only_the_command_line_speaks_to_a_terminal():
+    speaking = [
+        f"{module} imports {name}"
+        for module, tree in TREES.items()
+        if room_of(module) != "cli"
+        for name in imported(tree)
+        if name.split(".")[0] in TERMINAL
+    ]
+    assert speaking == []
+
+
+def test_options_are_spoken_of_on_the_command_line_only():
+    quoting = {
+        module
+        for module, tree in TREES.items()
+        if room_of(module) != "cli" and any(map(OPTION.search, texts(tree)))
+    }
+    quoting = {module for module in quoting if not module.startswith(QUOTING_WING)}
+    assert quoting - QUOTES_OPTIONS.keys() == set()
+    no_more = QUOTES_OPTIONS.keys() - quoting
+    assert no_more == set(), "these quote none any more: strike them from the list"
+
+
+def test_no_class_name_is_taken_twice():
+    homes = defaultdict(list)
+    for module, tree in TREES.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                homes[node.name.lstrip("_")].append(module)
+    assert {name: modules for name, modules in homes.items() if len(modules) > 1} == {}
+
+
+def test_no_module_elsewhere_names_a_distribution():
     entries = mdfconv.list_distributions()
     names = {name for entry in entries for name in (entry.name, *entry.aliases)}
     names |= {f"{entry.name}:{encoding.name}" for entry in entries for encoding in entry.encodings}
-    rooms = {type(entry).__module__ for entry in entries}
-    tree = tree_of(module)
-    documentation = docstrings(tree)
-    named = {
-        node.value
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and node.value in names and id(node) not in documentation
+    modules = {type(entry).__module__ for entry in entries}
+    naming = {
+        module: sorted((names & set(texts(tree))) | (modules & set(imported(tree))))
+        for module, tree in TREES.items()
+        if room_of(module) != "distributions"
     }
-    opened = rooms & set(imported(tree))
-    if module in ABOUT_PARTICULAR_ONES:
-        assert named or opened, f"{module} names none any more: strike it from the list"
-    else:
-        assert not named
-        assert not opened
+    naming = {module: found for module, found in naming.items() if found}
+    unexpected = {module: naming[module] for module in naming.keys() - ABOUT_PARTICULAR_ONES.keys()}
+    assert unexpected == {}
+    no_more = sorted(ABOUT_PARTICULAR_ONES.keys() - naming.keys())
+    assert no_more == [], "these name none any more: strike them from the list"

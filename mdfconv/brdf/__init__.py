@@ -2,6 +2,6 @@
 
 from mdfconv.brdf.fresnel import conductor, dielectric
 from mdfconv.brdf.microfacet import MASKINGS, Microsurface
-from mdfconv.brdf.reflection import BRDFS, normalization
+from mdfconv.brdf.reflection import BRDFS
 
-__all__ = ["BRDFS", "MASKINGS", "Microsurface", "conductor", "dielectric", "normalization"]
+__all__ = ["BRDFS", "MASKINGS", "Microsurface", "conductor", "dielectric"]

@@ -34,7 +34,7 @@ from mdfconv.registry import ALL
 
 if TYPE_CHECKING:
     from mdfconv.distributions.endpoint import Endpoint
-    from mdfconv.render.comparison import ConversionRule, Scene
+    from mdfconv.render.comparison import PictureRule, Scene
 
 _COLUMNS = (
     "figure", "conversion", "distribution", "parameter", "rmse_linear", "psnr_linear",
@@ -166,11 +166,13 @@ def command(
     from mdfconv.render.page import comparison_page
 
     outputs = Outputs(html, force=force)
+    names = targets or []
     end = asked_endpoint(source)
-    ends = _targets(end, targets or [])
+    ends = _targets(end, names)
     contents: dict[Path, bytes] = {}
     if html is not None:
-        shown = ends[0] if targets else _on_page(ends)
+        usual = [target for target in ends if target.label == _ON_PAGE and not names]
+        shown = (usual or ends)[0]
         contents[html] = comparison_page(end, shown, values[0] if values else None)
         if output is None:
             outputs.write(contents)
@@ -178,10 +180,10 @@ def command(
     refuse_idle_metric(context, method)
     rules = _rules(method, metric, exposure)
     surfaces = _surfaces(end, values)
-    if _takes_every(targets):
+    if _asks_for_all(names):
         ends = _answering(surfaces.values(), rules, end, ends)
     scene = Scene(brdf.value, light.value, normalized, exposure, size, material)
-    words = _words(scene, rules, targets or [])
+    words = _words(scene, rules, names)
     figures = {_file_name([start, *words]): value for start, value in surfaces.items()}
     folder = check_folder(context, output)
     outputs.check(*(folder / f"{name}.{kind}" for name in figures for kind in ("csv", "png")))
@@ -194,31 +196,37 @@ def command(
         contents[folder / f"{name}.png"] = draw_comparison(comparison, dpi)
     outputs.write(contents)
     form = form_of(format_)
-    write_table(_COLUMNS, _shown(rows, ends, form), form, title=_title(end, figures.values()))
+    if form is Format.table:
+        # People read parameters with their symbols.
+        texts = {target.label: target.text for target in ends}
+        for row in rows:
+            row["parameter"] = texts[row["distribution"]](row["parameter"])
+    compared = " and ".join(map(end.text, surfaces.values()))
+    title = f"Pictures against those of {end.label}, {compared}"
+    write_table(_COLUMNS, rows, form, title=title)
 
 
-def _words(scene: Scene, rules: Sequence[ConversionRule], targets: Sequence[str]) -> list[str]:
+def _words(scene: Scene, rules: Sequence[PictureRule], targets: Sequence[str]) -> list[str]:
     """Return words for names of files: for all that is not as usual but the number of pixels."""
     from mdfconv.conversion import method_named
     from mdfconv.render.comparison import Scene, default_rules
 
-    usual, words = Scene(), list(targets)
+    words = list(targets)
     if [rule.label for rule in rules] != [rule.label for rule in default_rules(scene.exposure)]:
         for rule in rules:
-            kept = [str(rule.metric)] if method_named(rule.method).follows_metric else []
-            words += [rule.method, *kept]
-    words += [
-        word
-        for word, differs in (
-            (scene.brdf, scene.brdf != usual.brdf),
-            (scene.light, scene.light != usual.light),
-            ("unit-form", scene.normalized != usual.normalized),
-            (f"exposure-{value_name(scene.exposure)}", scene.exposure != usual.exposure),
-            (scene.material or "", scene.material != usual.material),
-        )
-        if differs
-    ]
-    return words
+            words.append(rule.method)
+            if method_named(rule.method).follows_metric:
+                words.append(str(rule.metric))
+    usual = Scene()
+    of_scene = {
+        "brdf": scene.brdf,
+        "light": scene.light,
+        "normalized": "unit-form",
+        "exposure": f"exposure-{value_name(scene.exposure)}",
+        "material": str(scene.material),
+    }
+    unusual = [name for name in of_scene if getattr(scene, name) != getattr(usual, name)]
+    return words + [of_scene[name] for name in unusual]
 
 
 def _file_name(words: Sequence[str]) -> str:
@@ -226,27 +234,25 @@ def _file_name(words: Sequence[str]) -> str:
     return re.sub(r"[^\w.+-]+", "-", "-".join(words))
 
 
-def _takes_every(targets: list[str] | None) -> bool:
-    return any(name.strip().lower() == ALL for name in targets or ())
+def _asks_for_all(targets: Sequence[str]) -> bool:
+    return any(name.strip().lower() == ALL for name in targets)
 
 
-def _targets(source: Endpoint, names: list[str]) -> list[Endpoint]:
+def _targets(source: Endpoint, names: Sequence[str]) -> list[Endpoint]:
     """Return what takes the source's place: what is named, or the paper's other distributions."""
     from mdfconv.distributions import one_parameter_distributions
     from mdfconv.distributions.endpoint import one_parameter_endpoint
     from mdfconv.render.comparison import PAPER_SETS
 
-    if names and not _takes_every(names):
+    if names and not _asks_for_all(names):
         ends = [asked_endpoint(name) for name in names]
         return list({end.label: end for end in ends}.values())
-    others = (
-        [mdf.name for mdf in one_parameter_distributions()] if names else list(PAPER_SETS["fig1"])
-    )
-    return [one_parameter_endpoint(name) for name in others if name != source.distribution.name]
+    every = [mdf.name for mdf in one_parameter_distributions()] if names else PAPER_SETS["fig1"]
+    return [one_parameter_endpoint(name) for name in every if name != source.distribution.name]
 
 
 def _answering(
-    values: Iterable[float], rules: Sequence[ConversionRule], source: Endpoint, ends: list[Endpoint]
+    values: Iterable[float], rules: Sequence[PictureRule], source: Endpoint, ends: list[Endpoint]
 ) -> list[Endpoint]:
     """Return the targets to which all values can be converted; say why the others are left out."""
     from mdfconv.conversion import convert
@@ -279,31 +285,15 @@ def _surfaces(source: Endpoint, values: list[float] | None) -> Mapping[str, floa
     return PAPER_FIGURES
 
 
-def _title(source: Endpoint, values: Iterable[float]) -> str:
-    shown = " and ".join(map(source.text, values))
-    return f"Pictures against those of {source.label}, {shown}"
-
-
-def _shown(rows: list[dict[str, Any]], ends: Sequence[Endpoint], form: Format) -> Any:
-    """Return the rows for a form: on a terminal parameters have their symbols."""
-    if form is not Format.table:
-        return rows
-    texts = {end.label: end.text for end in ends}
-    return [row | {"parameter": texts[row["distribution"]](row["parameter"])} for row in rows]
-
-
-def _on_page(ends: list[Endpoint]) -> Endpoint:
-    return next((end for end in ends if end.label == _ON_PAGE), ends[0])
-
-
-def _rules(method: str | None, metric: str | None, exposure: float) -> list[ConversionRule]:
+def _rules(method: str | None, metric: str | None, exposure: float) -> list[PictureRule]:
     from mdfconv.conversion import method_named
     from mdfconv.fitting.metrics import metric_named
-    from mdfconv.render.comparison import ConversionRule, default_rules
+    from mdfconv.render.comparison import PictureRule, default_rules
 
     if method is None and metric is None:
         return default_rules(exposure)
-    kept = metric_named(metric or "unit")
-    # A screen's picture is exposed as the scene is.
-    kept = chosen_metric(kept.name, exposure) if kept.setting == "exposure" else kept
-    return [ConversionRule(method_named(method or "fit").name, kept)]
+    chosen = metric_named(metric or "unit")
+    if chosen.setting == "exposure":
+        # A screen's picture is exposed as the scene is.
+        chosen = chosen_metric(chosen.name, exposure)
+    return [PictureRule(method_named(method or "fit").name, chosen)]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
@@ -147,38 +148,28 @@ def materials() -> list[str]:
 def whole_words() -> Iterator[None]:
     """Let names with a colon be completed in bash, which takes a colon for the end of a word.
 
-    Bash gives ``ggx:rou`` as the three words ``ggx``, ``:`` and ``rou``, and puts what it is
-    answered in the place of the last one only.
+    Bash gives ``ggx:rou`` as the three words ``ggx``, ``:`` and ``rou``, and puts what is printed
+    in the place of the last one only.
     """
-    words = os.environ.get("COMP_WORDS", "")
-    if "bash" not in os.environ.get("_MDFCONV_COMPLETE", "") or _COLON not in words:
+    words = os.environ.get("COMP_WORDS", "").split("\n")
+    if "bash" not in os.environ.get("_MDFCONV_COMPLETE", "") or _joined(words) == words:
         yield
         return
-    parts = words.split("\n") if "\n" in words else words.split()
-    joined, number = _joined(parts, int(os.environ["COMP_CWORD"]))
-    os.environ["COMP_WORDS"], os.environ["COMP_CWORD"] = "\n".join(joined), str(number)
-    # Where bash was told otherwise the word is whole, and replaced as such.
-    divided = joined != parts and number < len(joined)
-    before = joined[number].rpartition(_COLON)[0] if divided else ""
-    answer = io.StringIO()
+    current = int(os.environ["COMP_CWORD"])
+    words += [""] * (current + 1 - len(words))
+    until_here = _joined(words[: current + 1])
+    os.environ["COMP_WORDS"] = "\n".join(_joined(words))
+    os.environ["COMP_CWORD"] = str(len(until_here) - 1)
+    printed = io.StringIO()
     try:
-        with redirect_stdout(answer):
+        with redirect_stdout(printed):
             yield
     finally:
-        start = f"{before}{_COLON}" if before else ""
-        lines = [line.removeprefix(start) for line in answer.getvalue().splitlines()]
-        sys.stdout.write("\n".join(lines))
+        before = until_here[-1][: until_here[-1].rfind(_COLON) + 1]
+        names = printed.getvalue().splitlines()
+        sys.stdout.write("\n".join(name.removeprefix(before) for name in names))
 
 
-def _joined(parts: list[str], number: int) -> tuple[list[str], int]:
-    """Return the words that colons divide as one each, and the place of the current one."""
-    words: list[str] = []
-    place = number
-    for index, part in enumerate(parts):
-        if words and (part.startswith(_COLON) or words[-1].endswith(_COLON)):
-            words[-1] += part
-        else:
-            words.append(part)
-        if index == number:
-            place = len(words) - 1
-    return words, min(place, len(words))
+def _joined(words: list[str]) -> list[str]:
+    """Return words, those that colons divide as one each."""
+    return re.sub(rf"\n?{_COLON}\n?", _COLON, "\n".join(words)).split("\n")

@@ -85,12 +85,7 @@ ExposureOption = Annotated[
 ]
 _GAMMA_HELP = "Second parameter, of gtr and student-t; 2, which is ggx, if not given"
 GammaOption = Annotated[
-    str | None,
-    typer.Option(
-        "--gamma",
-        metavar="G",
-        help=f"{_GAMMA_HELP}; free fits it.",
-    ),
+    str | None, typer.Option("--gamma", metavar="G", help=f"{_GAMMA_HELP}; free fits it.")
 ]
 FixedGammaOption = Annotated[
     str | None, typer.Option("--gamma", metavar="G", help=f"{_GAMMA_HELP}.")
@@ -140,22 +135,7 @@ DpiOption = Annotated[
 
 
 def refuse_given(context: typer.Context, names: Collection[str], why: str) -> None:
-    """Refuse options that would be ignored.
-
-    Parameters
-    ----------
-    context : typer.Context
-        Of the command.
-    names : collection of str
-        The parameters of the command.
-    why : str
-        What follows the option's name in the refusal.
-
-    Raises
-    ------
-    MdfconvError
-        If one is on the command line.
-    """
+    """Refuse options that would be ignored; `why` follows the option's name in the refusal."""
     for option in context.command.params:
         source = context.get_parameter_source(option.name or "")
         if option.name in names and source is not None and source.name == "COMMANDLINE":
@@ -163,7 +143,7 @@ def refuse_given(context: typer.Context, names: Collection[str], why: str) -> No
 
 
 def refuse_idle_metric(context: typer.Context, method: str | None) -> None:
-    """Refuse ``--metric`` beside a method that follows none; raise as `refuse_given`."""
+    """Refuse ``--metric`` beside a method that follows none."""
     if method is not None:
         from mdfconv.conversion import method_named
 
@@ -172,13 +152,7 @@ def refuse_idle_metric(context: typer.Context, method: str | None) -> None:
 
 
 def chosen_metric(name: str, exposure: float | None = None) -> Metric:
-    """Return the metric for the two options.
-
-    Raises
-    ------
-    MdfconvError
-        If the name is not known, or the metric has no exposure.
-    """
+    """Return the metric for the two options; refuse an exposure of a metric that has none."""
     from mdfconv.fitting.metrics import metric_named
 
     if exposure is None:
@@ -191,7 +165,7 @@ def chosen_metric(name: str, exposure: float | None = None) -> Metric:
 
 
 def asked_metric(name: str | None, exposure: float | None) -> Metric | None:
-    """Return the metric for the two options, None if neither is given; raise as the former."""
+    """Return the metric for the two options, None if neither is given."""
     from mdfconv.fitting.metrics import list_metrics
 
     if name is None and exposure is None:
@@ -210,7 +184,7 @@ def every_metric(exposure: float | None = None) -> list[Metric]:
 
 
 def fixed_gamma(text: str | None) -> float | None:
-    """Return what ``--gamma`` says where it cannot be free; raise `MdfconvError` if it is."""
+    """Return what ``--gamma`` says where it cannot be free."""
     gamma = chosen_gamma(text)
     if gamma is None or isinstance(gamma, float):
         return gamma
@@ -218,13 +192,7 @@ def fixed_gamma(text: str | None) -> float | None:
 
 
 def chosen_gamma(text: str | None) -> Gamma:
-    """Return what ``--gamma`` says: None, a number or ``"free"``.
-
-    Raises
-    ------
-    MdfconvError
-        If it is something else.
-    """
+    """Return what ``--gamma`` says: None, a number or ``"free"``."""
     from mdfconv.conversion.values import FREE
 
     if text is None:

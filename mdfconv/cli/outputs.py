@@ -19,21 +19,8 @@ _DEFAULT_FOLDER = Path("reports")
 class Outputs:
     """The files that a command writes: checked when they are named, written all or none.
 
-    Parameters
-    ----------
-    *files : Path or None
-        Those that are known before the work, None for one that is not wanted.
-    force : bool
-        Whether a file that exists is replaced, not refused.
-    table : Path or None
-        Where `write_table` writes, if not to standard output.
-    inputs : sequence of Path
-        What is read, and must not be written over.
-
-    Raises
-    ------
-    MdfconvError
-        As `check`.
+    `files` are those that are known before the work, None for one that is not wanted; `table` is
+    where `write_table` writes, if not to standard output; `inputs` must not be written over.
     """
 
     def __init__(
@@ -49,14 +36,7 @@ class Outputs:
         self.check(*files, table)
 
     def check(self, *files: Path | None) -> None:
-        """Check files that are named later than the others.
-
-        Raises
-        ------
-        MdfconvError
-            If two have one name, one exists, is an input or a folder, or its folder is missing or
-            closed.
-        """
+        """Refuse files that cannot be written: names given twice, what exists, inputs, folders."""
         for path in (path for path in files if path is not None):
             try:
                 self._check(path)
@@ -95,13 +75,7 @@ class Outputs:
 
 
 def new_folder(context: typer.Context, folder: Path) -> None:
-    """Create a folder that is not there; at the end of a command that left it empty it goes.
-
-    Raises
-    ------
-    MdfconvError
-        If it cannot be created.
-    """
+    """Create a folder that is not there; at the end of a command that left it empty it goes."""
     if not folder.is_dir():
         create_folder(folder)
         context.call_on_close(lambda: _remove_if_empty(folder))
@@ -113,13 +87,7 @@ def _remove_if_empty(folder: Path) -> None:
 
 
 def check_folder(context: typer.Context, folder: Path | None) -> Path:
-    """Return the folder to write to, created if it is not there; without a choice ./reports.
-
-    Raises
-    ------
-    MdfconvError
-        If it is not a folder, or cannot be created or written to.
-    """
+    """Return the folder to write to, created if it is not there; without a choice ./reports."""
     chosen = folder or _DEFAULT_FOLDER
     new_folder(context, chosen)
     if not os.access(chosen, os.W_OK):

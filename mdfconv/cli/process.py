@@ -19,6 +19,7 @@ import typer
 from mdfconv.errors import MdfconvError, MdfconvWarning
 
 REFUSED, MISTAKEN, INTERRUPTED = 2, 3, 130
+_STANDARD_ERROR = 2
 # With this variable set a mistake shows where it happened.
 _DEBUG = "MDFCONV_DEBUG"
 _ISSUES = "https://github.com/mdfconv/mdfconv/issues"
@@ -27,13 +28,7 @@ _UsageError: type[Any] = typer.BadParameter.__mro__[1]
 
 
 def run(command: Callable[[], int | None]) -> int:
-    """Run a command and return its exit status, with whatever went wrong said in one line.
-
-    Parameters
-    ----------
-    command : callable
-        Returns a status, None for 0.
-    """
+    """Run a command that returns a status, None for 0; say what goes wrong in one line."""
     _prepare_streams()
     try:
         if sys.stdout is None:
@@ -46,9 +41,13 @@ def run(command: Callable[[], int | None]) -> int:
             tell(f"note: {note}")
         sys.stdout.flush()
     except SystemExit as end:
-        # Typer ends the process by itself where the reader of a pipe has gone.
-        reader_gone = isinstance(end.__context__, BrokenPipeError)
-        status = _without_reader() if reader_gone else _status(end)
+        if isinstance(end.__context__, BrokenPipeError):
+            # Typer ends the process by itself where the reader of a pipe has gone.
+            status = _without_reader()
+        elif end.code is None or isinstance(end.code, int):
+            status = end.code or 0
+        else:
+            status = _refuse(str(end.code))
     except BrokenPipeError:
         status = _without_reader()
     except (KeyboardInterrupt, typer.Abort):
@@ -81,12 +80,6 @@ def _failed(error: Exception) -> int:
     return MISTAKEN
 
 
-def _status(end: SystemExit) -> int:
-    if end.code is None or isinstance(end.code, int):
-        return end.code or 0
-    return _refuse(str(end.code))
-
-
 def _without_reader() -> int:
     """Let go of standard output, whose reader has what it wanted."""
     _discard(sys.stdout)
@@ -96,20 +89,14 @@ def _without_reader() -> int:
 def _prepare_streams() -> None:
     """Make every standard stream one that can be written to, or None: standard output."""
     if sys.stderr is None:
-        _occupy_descriptors()
-        sys.stderr = open(os.devnull, "w")  # noqa: SIM115 (as long as the process)
+        # No file that is opened later may become the descriptor of a stream that is closed.
+        while (descriptor := os.open(os.devnull, os.O_RDWR)) < _STANDARD_ERROR:
+            pass
+        sys.stderr = open(descriptor, "w")  # noqa: SIM115 (as long as the process)
     for stream in (sys.stdout, sys.stderr):
         # A terminal that cannot show α shows ? instead of a traceback.
         if stream is not None:
             stream.reconfigure(errors="replace")  # type: ignore[union-attr]
-
-
-def _occupy_descriptors() -> None:
-    """Keep files that are opened later from becoming a standard stream that is closed."""
-    descriptor = os.open(os.devnull, os.O_RDWR)
-    while descriptor <= 2:
-        descriptor = os.open(os.devnull, os.O_RDWR)
-    os.close(descriptor)
 
 
 def _discard(stream: TextIO) -> None:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TextIO
+from typing import IO, TYPE_CHECKING, Any, Literal
 
 import typer
 
@@ -27,8 +27,10 @@ if TYPE_CHECKING:
 _PIPE_WIDTH = 160
 # Nobody reads more in a terminal, and Rich takes a millisecond a row.
 ROWS_SHOWN = 500
-# Longer words may be broken; text in less than the other is hard to read.
-_LONGEST_WORD, _READABLE = 24, 16
+# Longer words may be broken.
+_LONGEST_WORD = 24
+# Columns of text are hard to read in less.
+_READABLE_WIDTH = 16
 _LETTER = re.compile(r"[^\W\d_eE]")
 _ENDINGS = {".json": Format.json, ".md": Format.markdown, ".txt": Format.table}
 
@@ -60,26 +62,10 @@ def write_table(
     styles: Sequence[str] = (),
     secondary: Sequence[str] = (),
 ) -> None:
-    """Write rows to standard output or to a file, in the form asked for.
+    """Write rows to standard output or to the file of the table, in the form asked for.
 
-    Parameters
-    ----------
-    columns : sequence of str
-        Keys of the rows, in order: the headings.
-    rows : sequence of mapping
-        Cells: numbers, text, None for an empty one, tuples and lists of numbers or text.
-    form : Format or None
-        As for `form_of`.
-    outputs : Outputs, optional
-        The files of the command, of which one may be that of the table.
-    beside : mapping of Path to bytes, optional
-        Its other files, written with that of the table or before it is printed.
-    title : str
-        Above a table on a terminal.
-    styles : sequence of str
-        Rich's style of each row of a table on a terminal.
-    secondary : sequence of str
-        Columns that a narrow terminal leaves out before others, from the last one.
+    `beside` has other files of the command, written with that of the table or before it is printed;
+    title, `styles` of rows and `secondary` are those of `print_table`.
     """
     output = outputs.table if outputs else None
     form = form_of(form, output)
@@ -103,7 +89,7 @@ def table_text(columns: Sequence[str], rows: Sequence[Record], form: Format) -> 
         return json_text([{column: row[column] for column in columns} for row in rows])
     if form is Format.table:
         buffer = io.StringIO()
-        _print(buffer, _columns(columns, rows))
+        _print(_console(buffer), _columns(columns, rows))
         return buffer.getvalue().rstrip()
     number = cell_text if form is Format.markdown else str
     flat = [{column: _flat(row[column], number) for column in columns} for row in rows]
@@ -125,30 +111,18 @@ def print_table(
     everything: str = "--format csv",
     count: int | None = None,
 ) -> None:
-    """Print the first `ROWS_SHOWN` rows, on a terminal no wider than it is.
+    """Print the first `ROWS_SHOWN` of `count` rows, on a terminal no wider than it is.
 
-    Text wraps, numbers do not; where there is no room for all columns, standard error says which
-    are left out.
-
-    Parameters
-    ----------
-    columns, rows, title, styles
-        As for `write_table`.
-    secondary : sequence of str
-        Columns to leave out before others, from the last one; then the last columns go.
-    err : bool
-        Print to standard error.
-    everything : str
-        The option that shows what is left out.
-    count : int, optional
-        How many rows there are, if these are not all.
+    Text wraps, numbers do not. Where there is no room for all columns, those that are `secondary`
+    are left out first, from the last one, then the last of the others; standard error says which,
+    and what option shows `everything`.
     """
-    stream = sys.stderr if err else sys.stdout
+    out = console(err=err)
     shown = rows[:ROWS_SHOWN]
     table = _columns(columns, shown)
-    kept = _fitting(table, console(err=err).width, secondary) if stream.isatty() else table
-    _print(stream, kept, title, styles)
-    left_out = [column.name for column in table if column not in kept]
+    printed = _with_room(table, out.width, secondary) if out.is_terminal else table
+    _print(out, printed, title, styles)
+    left_out = [column.name for column in table if column not in printed]
     if left_out:
         tell(f"too narrow for {', '.join(left_out)}: {everything} has all columns")
     more = (len(rows) if count is None else count) - len(shown)
@@ -177,8 +151,12 @@ class _Column:
             min(_width(word), _LONGEST_WORD) if _LETTER.search(word) else _width(word)
             for word in pieces
         ]
-        readable = min(self.widest, _READABLE) if self.words else 0
+        readable = min(self.widest, _READABLE_WIDTH) if self.words else 0
         return max(readable, *map(_width, self.name.split()), *unbroken)
+
+    def width(self, limit: int) -> int:
+        """Return the width of a column that is to have at most so much."""
+        return max(self.narrowest, min(self.widest, limit))
 
 
 def _width(text: str) -> int:
@@ -188,12 +166,11 @@ def _width(text: str) -> int:
 
 
 def _columns(names: Sequence[str], rows: Sequence[Record]) -> list[_Column]:
-    cells = {name: [row[name] for row in rows] for name in names}
     return [
         _Column(
             name,
-            [cell_text(_flat(cell, cell_text)) for cell in cells[name]],
-            not any(map(_is_number, cells[name])),
+            [cell_text(_flat(row[name], cell_text)) for row in rows],
+            not any(_is_number(row[name]) for row in rows),
         )
         for name in names
     ]
@@ -204,13 +181,25 @@ def _is_number(cell: Any) -> bool:
     return isinstance(cell[0] if several else cell, int | float)
 
 
-def _fitting(table: list[_Column], width: int, secondary: Sequence[str]) -> list[_Column]:
+def _with_room(table: list[_Column], room: int, secondary: Sequence[str]) -> list[_Column]:
     """Return the columns for which there is room, at least one."""
+    # The last one goes first: those that are secondary stand behind the others.
     order = {name: number for number, name in enumerate(secondary)}
-    kept = sorted(table, key=lambda column: order.get(column.name, -1))
-    while len(kept) > 1 and _framed(column.narrowest for column in kept) > width:
-        kept.pop()
-    return [column for column in table if column in kept]
+    ranked = sorted(table, key=lambda column: order.get(column.name, -1))
+    while len(ranked) > 1 and _framed(column.narrowest for column in ranked) > room:
+        ranked.pop()
+    return [column for column in table if column in ranked]
+
+
+def _widths(table: list[_Column], room: int) -> list[int]:
+    """Return what each column gets: all it can use, or of the same for all as much as fits."""
+    widths = [column.narrowest for column in table]
+    for limit in range(max((column.widest for column in table), default=0) + 1):
+        wider = [column.width(limit) for column in table]
+        if _framed(wider) > room:
+            break
+        widths = wider
+    return widths
 
 
 def _framed(widths: Iterable[int]) -> int:
@@ -218,27 +207,21 @@ def _framed(widths: Iterable[int]) -> int:
     return sum(width + 3 for width in widths) + 1
 
 
-def _print(
-    stream: TextIO, table: list[_Column], title: str = "", styles: Sequence[str] = ()
-) -> None:
+def _print(out: Console, table: list[_Column], title: str = "", styles: Sequence[str] = ()) -> None:
     """Print columns, in the width of a terminal if they can be as narrow."""
     from rich import box
     from rich.markup import escape
     from rich.table import Table
 
-    out = _console(stream)
-    widths, least = ([getattr(c, name) for c in table] for name in ("widest", "narrowest"))
-    while _framed(widths) > out.width and widths != least:
-        # The widest give way.
-        wide = max(range(len(table)), key=lambda n: widths[n] * (widths[n] > least[n]))
-        widths[wide] -= 1
+    widths = _widths(table, out.width)
     rich = Table(box=box.SIMPLE_HEAD, title=title, title_style="bold", title_justify="left")
     for column, width in zip(table, widths, strict=True):
         justify: Literal["left", "right"] = "left" if column.words else "right"
         rich.add_column(escape(column.name), justify=justify, overflow="fold", width=width)
     for number, cells in enumerate(zip(*(column.cells for column in table), strict=True)):
         rich.add_row(*map(escape, cells), style=styles[number] if styles else None)
-    _console(stream, max(out.width, _framed(widths))).print(rich)
+    # Where no column can be left out a pipe is as wide as it takes.
+    _console(out.file, max(out.width, _framed(widths))).print(rich)
 
 
 def console(*, err: bool = False) -> Console:
@@ -246,7 +229,7 @@ def console(*, err: bool = False) -> Console:
     return _console(sys.stderr if err else sys.stdout)
 
 
-def _console(stream: TextIO, width: int | None = None) -> Console:
+def _console(stream: IO[str], width: int | None = None) -> Console:
     from rich.console import Console
 
     usual = None if stream.isatty() else _PIPE_WIDTH
@@ -265,19 +248,19 @@ def progress(description: str, total: int) -> Iterator[Callable[[int], None]]:
         yield lambda steps: bar.advance(task, steps)
 
 
-def _flat(cell: Any, number: Callable[[Any], str] = str) -> Any:
+def _flat(cell: Any, text: Callable[[Any], str] = str) -> Any:
     """Return a cell as a single value: nothing is empty, several numbers are one text."""
     if cell is None:
         return ""
     if isinstance(cell, Mapping):
-        return "; ".join(f"{key}: {_flat(value, number)}" for key, value in cell.items())
+        return "; ".join(f"{key}: {_flat(value, text)}" for key, value in cell.items())
     if isinstance(cell, list | tuple):
         if any(isinstance(value, Mapping) for value in cell):
-            return " | ".join(str(_flat(value, number)) for value in cell)
-        words = any(isinstance(value, str) for value in cell)
+            return " | ".join(str(_flat(value, text)) for value in cell)
+        if any(isinstance(value, str) for value in cell):
+            return "; ".join(map(text, cell))
         # A table may wrap between numbers.
-        separator = "; " if words else "," if number is str else ", "
-        return separator.join(map(number, cell))
+        return ("," if text is str else ", ").join(map(text, cell))
     return cell
 
 

@@ -21,16 +21,7 @@ SLOW = 4
 # A clamp is a minimum and a maximum, each as cheap as +.
 CLAMP = 2
 # Prices of raising to these powers.
-POWERS = {
-    -2.0: SLOW + 1,
-    -1.0: SLOW,
-    -0.5: SLOW,
-    0.0: 0,
-    0.5: SLOW,
-    1.0: 0,
-    2.0: 1,
-    4.0: 2,
-}
+POWERS = {-2.0: SLOW + 1, -1.0: SLOW, -0.5: SLOW, 0.0: 0, 0.5: SLOW, 1.0: 0, 2.0: 1, 4.0: 2}
 # What lobes ask for: α, its square and its fourth power (an exponent of a roughness), a root (a
 # roughness of α), an inverse (α² of an exponent).
 _VARIABLES = (1.0, 2.0, 4.0, 0.5, -1.0)

@@ -1,6 +1,6 @@
 """Formulas as code to paste: GLSL, HLSL, C, Python and LaTeX.
 
-A new language of code is a `Dialect` that is added to `LANGUAGES`; LaTeX is not code and stands
+A new language of code is a `Syntax` that is added to `LANGUAGES`; LaTeX is not code and stands
 apart.
 """
 
@@ -45,13 +45,7 @@ _TAKEN = {*_WORDS.split(), *keyword.kwlist}
 
 
 class Language(ABC):
-    """A form in which a formula is written.
-
-    Parameters
-    ----------
-    comment : str
-        What starts a comment line.
-    """
+    """A form in which a formula is written; `comment` starts a line that is not part of it."""
 
     comment: str
 
@@ -64,35 +58,39 @@ class Language(ABC):
         """Return what the formula computes in a single line, for a table."""
 
 
+def _plain(value: float) -> str:
+    return str(np.float32(value))
+
+
 @dataclass(frozen=True)
 class Syntax(Language):
-    """How a programming language writes what the formulas need.
+    """How a programming language writes what the formulas need; without words of its own as GLSL.
 
     Parameters
     ----------
-    comment : str
-        What starts a comment line.
+    inverse_root, root, clamp : str
+        1/√ and √ of an expression; one clamped to a lower and an upper bound.
+    number : callable
+        A number in single precision.
     head, declare, end, foot : str
         The line of the function with {name} and {argument}; a constant with {name} and {value};
         what ends a statement; what ends the function.
-    number : callable
-        A number in single precision.
-    clamp, root, inverse_root : str
-        An expression clamped to a lower and an upper bound; √ and 1/√ of an expression.
     include : str
         What must stand before the function.
+    comment : str
+        What starts a comment line.
     """
 
-    comment: str
-    head: str
-    declare: str
-    end: str
-    foot: str
-    number: Callable[[float], str]
-    clamp: str
-    root: str
     inverse_root: str
+    root: str = "sqrt({})"
+    clamp: str = "clamp({}, {}, {})"
+    number: Callable[[float], str] = _plain
+    head: str = "float {name}(float {argument}) {{"
+    declare: str = "float {name} = {value}"
+    end: str = ";"
+    foot: str = "}"
     include: str = ""
+    comment: str = "//"
 
     def lines(self, formula: Formula, problem: SearchProblem) -> list[str]:
         """Return the lines of a function of the source's stored value."""
@@ -148,58 +146,32 @@ class Latex(Language):
         return f"{_latex_symbol(problem.target)} = {start}{value}"
 
 
-def _plain(value: float) -> str:
-    return str(np.float32(value))
-
-
-_SHADER = {
-    "comment": "//",
-    "head": "float {name}(float {argument}) {{",
-    "declare": "float {name} = {value}",
-    "end": ";",
-    "foot": "}",
-}
-_CLAMP = "clamp({}, {}, {})"
 LANGUAGES: Registry[Language] = Registry("language")
-LANGUAGES.add(
-    "glsl",
-    Syntax(
-        **_SHADER,
-        number=_plain,
-        clamp=_CLAMP,
-        root="sqrt({})",
-        inverse_root="inversesqrt({})",
-    ),
-)
-LANGUAGES.add(
-    "hlsl",
-    Syntax(**_SHADER, number=_plain, clamp=_CLAMP, root="sqrt({})", inverse_root="rsqrt({})"),
-)
+LANGUAGES.add("glsl", Syntax(inverse_root="inversesqrt({})"))
+LANGUAGES.add("hlsl", Syntax(inverse_root="rsqrt({})"))
 LANGUAGES.add(
     "c",
     Syntax(
-        **_SHADER,
-        number=lambda value: f"{_plain(value)}f",
-        clamp="fminf(fmaxf({}, {}), {})",
-        root="sqrtf({})",
         inverse_root="1.0f / sqrtf({})",
+        root="sqrtf({})",
+        clamp="fminf(fmaxf({}, {}), {})",
+        number=lambda value: f"{_plain(value)}f",
         include="#include <math.h>",
     ),
 )
 LANGUAGES.add(
     "python",
     Syntax(
-        comment="#",
+        inverse_root="{} ** -0.5",
+        root="{} ** 0.5",
+        # min and max of the language are for numbers alone.
+        clamp="np.clip({}, {}, {})",
         head="def {name}({argument}):",
         declare="{name} = {value}",
         end="",
         foot="",
-        number=_plain,
-        # min and max of the language are for numbers alone.
-        clamp="np.clip({}, {}, {})",
-        root="{} ** 0.5",
-        inverse_root="{} ** -0.5",
         include="import numpy as np\n\n",
+        comment="#",
     ),
 )
 LANGUAGES.add("latex", Latex())

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 
@@ -15,7 +17,8 @@ from mdfconv.formula.family import Formula, Shape, evaluate, horner, power, shap
 
 # Fits over the range, and the degree of the spline between them: on the usual ranges within the
 # rounding of float32 of the fit, and within 2e-5 at a kink, as where a maximum leaves the normal.
-_FITS, _SPLINE_DEGREE = 160, 5
+_FITS = 160
+_SPLINE_DEGREE = 5
 # Half a unit in the last place of single precision: no formula reaches less.
 _LEAST_TOLERANCE = 2.0**-24
 # Points at which the error is taken: what its peaks rise to between two of them is less than a
@@ -84,18 +87,17 @@ class SearchProblem:
         """Return w and t of the fits, at points that crowd towards the ends of the range."""
         from mdfconv.fitting.solve import fit
 
-        ends = np.log(natural(self.source, self.bounds.astype(float)))
+        limits = np.log(natural(self.source, self.bounds.astype(float)))
         turn = np.cos(np.pi * np.arange(_FITS) / (_FITS - 1))
-        w = np.exp(ends.mean() + 0.5 * (ends[1] - ends[0]) * turn[::-1])
-        w[[0, -1]] = np.exp(ends)
+        w = np.exp(limits.mean() + 0.5 * (limits[1] - limits[0]) * turn[::-1])
+        w[[0, -1]] = np.exp(limits)
         parameter = self.source.decode(self.clamped(natural(self.source, w)))
-        pair = self.source.distribution, self.target.distribution
-        best = fit(pair[0], parameter, pair[1], self.metric).parameter
-        t = natural(self.target, self.target.encode(best))
+        fitted = fit(self.source.distribution, parameter, self.target.distribution, self.metric)
+        t = natural(self.target, self.target.encode(fitted.parameter))
         # To 0, where a rule clamps, no error is relative.
-        answered = np.isfinite(t) & (t > 0)
-        if not answered.all():
-            missing = natural(self.source, w[~answered])
+        usable = np.isfinite(t) & (t > 0)
+        if not usable.all():
+            missing = natural(self.source, w[~usable])
             raise MdfconvError(
                 f"the fit has no answer in {self.target.label}, or only the end of its range, for "
                 f"{self.source.label} from {missing.min():.6g} to {missing.max():.6g}",
@@ -123,8 +125,8 @@ def is_glossy(end: Endpoint) -> bool:
     That is a number from 0 to 1 of which the larger is the smoother, and 1 a mirror.
     """
     stored = end.stored
-    ends = stored.lower, stored.upper
-    return stored.larger_is_smoother and ends == (0, 1) and not stored.upper_closed
+    to_one = stored.lower == 0 and stored.upper == 1 and not stored.upper_closed
+    return stored.larger_is_smoother and to_one
 
 
 def natural(end: Endpoint, stored: Array) -> Array:
@@ -137,7 +139,7 @@ def cheapest(problem: SearchProblem, tolerance: float) -> Formula:
 
     Parameters
     ----------
-    problem : Problem
+    problem : SearchProblem
         What is to be computed.
     tolerance : float
         Relative error against the fit, evaluated in float32.
@@ -178,13 +180,24 @@ def cheapest(problem: SearchProblem, tolerance: float) -> Formula:
 def pareto_front(problem: SearchProblem) -> list[Formula]:
     """Return the formulas that nothing as cheap beats, each a tenth better than the one before."""
     front: list[Formula] = []
-    for shape in shapes():
-        same_price = bool(front) and front[-1].shape.operations == shape.operations
-        bound = front[-1].error * (1 if same_price else _GAIN) if front else np.inf
+    for _, of_one_price in groupby(shapes(), key=lambda shape: shape.operations):
+        bound = _GAIN * front[-1].error if front else np.inf
+        best = _most_accurate(problem, of_one_price, bound)
+        if best is not None:
+            front.append(best)
+    return front
+
+
+def _most_accurate(
+    problem: SearchProblem, candidates: Iterable[Shape], bound: float
+) -> Formula | None:
+    """Return the formula with the smallest error below a bound, if there is one."""
+    best: Formula | None = None
+    for shape in candidates:
         formula = _best(problem, shape, bound)
         if formula is not None and formula.error < bound:
-            front[len(front) - same_price :] = [formula]
-    return front
+            best, bound = formula, formula.error
+    return best
 
 
 def _best(problem: SearchProblem, shape: Shape, bound: float) -> Formula | None:
@@ -194,10 +207,10 @@ def _best(problem: SearchProblem, shape: Shape, bound: float) -> Formula | None:
     """
     w, t = problem.samples
     with np.errstate(all="ignore"):
-        wanted = power(t, 1 / shape.outer) / power(w, shape.factor)
+        needed = power(t, 1 / shape.outer) / power(w, shape.factor)
         u = power(w, shape.variable)
         scale = np.max(np.abs(u))
-        coefficients = _minimax(u / scale, wanted, shape, _SLACK * bound / abs(shape.outer))
+        coefficients = _minimax(u / scale, needed, shape, _SLACK * bound / abs(shape.outer))
     if coefficients is None:
         return None
     up, down = coefficients[: shape.numerator], coefficients[shape.numerator :]
@@ -216,15 +229,15 @@ def _single(values: Array) -> tuple[float, ...]:
         return tuple(values.astype(np.float32).astype(float).tolist())
 
 
-def _minimax(u: Array, wanted: Array, shape: Shape, bound: float) -> Array | None:
-    """Return coefficients of P and Q that make the worst relative error nearly smallest.
+def _minimax(u: Array, needed: Array, shape: Shape, bound: float) -> Array | None:
+    """Return coefficients of P and Q whose worst relative error is nearly the smallest.
 
     Least squares, reweighted by its own errors (Lawson 1961) and, for a rational function, by
     its own denominator (Sanathanan & Koerner 1963). The weighted mean of the squared errors
     never exceeds the smallest worst one: None as soon as it is beyond the bound.
     """
     powers = u[:, None] ** np.arange(max(shape.numerator, shape.denominator + 1))
-    up = powers[:, : shape.numerator] / wanted[:, None]
+    up = powers[:, : shape.numerator] / needed[:, None]
     columns = np.concatenate([up, -powers[:, 1 : shape.denominator + 1]], axis=1)
     if not np.isfinite(columns).all():
         return None

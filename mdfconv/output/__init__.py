@@ -1,1 +1,1 @@
-"""What every result shares on its way out: records as text, whole files, figures, labels."""
+"""What every result shares on its way out: records as text, whole files, figures."""

@@ -9,10 +9,7 @@ from __future__ import annotations
 import io
 import os
 import tempfile
-from typing import Any, Literal
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from mdfconv.distributions import list_distributions
 
@@ -35,18 +32,8 @@ _WIDTH, _THINNER = 1.4, 0.9
 _PNG = {"metadata": {"Software": None}, "pil_kwargs": {"compress_level": 3}}
 
 
-def new_figure(
-    width: float, height: float, layout: Literal["constrained"] | None = "constrained"
-) -> Any:
-    """Return an empty figure that needs neither a display nor a writable home.
-
-    Parameters
-    ----------
-    width, height : float
-        In inches.
-    layout : str, optional
-        Matplotlib's layout engine; without one the axes stay where they are put.
-    """
+def new_figure(width: float, height: float) -> Any:
+    """Return an empty figure, in inches, that needs neither a display nor a writable home."""
     if "MPLCONFIGDIR" not in os.environ and not os.access(os.path.expanduser("~"), os.W_OK):
         os.environ["MPLCONFIGDIR"] = tempfile.mkdtemp(prefix="mdfconv-")
     import matplotlib as mpl
@@ -64,31 +51,9 @@ def new_figure(
             "legend.frameon": False,
         }
     )
-    figure = Figure(figsize=(width, height), layout=layout)
+    figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
-
-
-def place_pixels(figure: Any, pixels: NDArray[np.uint8]) -> None:
-    """Put an image beneath all else, pixel for pixel from the upper left corner.
-
-    Matplotlib's own images are resampled, which takes longer than the rest of a large figure.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        Its resolution is that in which it is saved.
-    pixels : numpy.ndarray, shape (height, width, 4)
-        RGBA; the size is that of the figure.
-    """
-    from matplotlib.artist import Artist
-
-    class Pixels(Artist):
-        def draw(self, renderer: Any) -> None:
-            # Agg takes the lowest line first.
-            renderer.draw_image(renderer.new_gc(), 0, 0, pixels[::-1])
-
-    figure.add_artist(Pixels()).set_zorder(-1)
 
 
 def line_style(name: str) -> dict[str, Any]:

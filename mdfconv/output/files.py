@@ -20,8 +20,8 @@ from mdfconv.errors import MdfconvError
 STANDARD_INPUT = "-"
 # Where open files have names, which may lead to a file, such as that of standard output.
 _OPEN_FILES = tuple(map(Path, ("/dev", "/dev/fd", "/proc/self/fd")))
-# What ends a process politely: it still puts its things away.
-_ENDS = ("SIGTERM", "SIGHUP")
+# Signals that ask a process to end, which still puts its things away.
+_ENDING_SIGNALS = ("SIGTERM", "SIGHUP")
 
 
 def file_bytes(text: str) -> bytes:
@@ -46,8 +46,8 @@ def find_files(patterns: Sequence[str]) -> list[Path]:
     """
     files: dict[Path, None] = {}
     for pattern in patterns:
-        there = pattern == STANDARD_INPUT or Path(pattern).exists()
-        names = [pattern] if there else sorted(glob.glob(pattern, recursive=True))
+        is_name = pattern == STANDARD_INPUT or Path(pattern).exists()
+        names = [pattern] if is_name else sorted(glob.glob(pattern, recursive=True))
         if not names:
             raise MdfconvError(f"cannot read {pattern}: No such file or directory")
         for folder in filter(os.path.isdir, names):
@@ -76,22 +76,10 @@ def write_files(
     new: Collection[Path] = (),
     like: Mapping[Path, Path] | None = None,
 ) -> None:
-    """Write files whole or not at all, as `staged_files`.
+    """Write files whole or not at all, as `staged_files`; those that are `new` must not exist.
 
-    Parameters
-    ----------
-    contents : mapping of Path to bytes
-        The files.
-    new : collection of Path
-        Those that must not exist.
-    like : mapping of Path to Path, optional
-        Files whose permissions and owner others get; without one they are those of a new file,
-        or of the file that is written over.
-
-    Raises
-    ------
-    MdfconvError
-        If a place cannot be written; nothing is then changed.
+    `like` has files whose permissions and owner others get; without one they are those of a new
+    file, or of the file that is written over.
     """
     with staged_files(new.__contains__) as files:
         for path, content in contents.items():
@@ -104,19 +92,14 @@ def staged_files(is_new: Callable[[Path], bool]) -> Iterator[StagedFiles]:
 
     A link stays one, and what is there and no file (a device, a pipe) is written to as it is.
     Data are on the disk before a name points to them. If a name cannot be changed, those that
-    were are changed back.
-
-    Parameters
-    ----------
-    is_new : callable
-        Whether a file must not exist: one that does, at the last moment, is not written over.
+    were are changed back. A file that is new and exists, at the last moment, is not written over.
 
     Raises
     ------
     MdfconvError
         If a place cannot be written; nothing is then changed.
     """
-    with _ends_raised(), StagedFiles() as files:
+    with _signals_raised(), StagedFiles() as files:
         try:
             yield files
             files.place(is_new)
@@ -135,7 +118,7 @@ class StagedFiles:
         self.current = Path()
         self._staged: dict[Path, Path] = {}
         self._like: dict[Path, Path] = {}
-        # Of each place that was changed the file that was there, under another name; None for none.
+        # Of each place that was changed the former file, under another name; None if it had none.
         self._before: list[tuple[Path, Path | None]] = []
 
     def __enter__(self) -> StagedFiles:
@@ -216,11 +199,11 @@ def _link(source: Path, target: Path) -> None:
 def _give_permissions(path: Path, like: Path) -> None:
     """Give a file the permissions and the owner of another, or those of any new file."""
     if like.is_file():
-        there = like.stat()
-        os.chmod(path, there.st_mode & 0o7777)
+        status = like.stat()
+        os.chmod(path, status.st_mode & 0o7777)
         # Only a superuser may give a file away; others own what they write.
         with suppress(OSError, AttributeError):
-            os.chown(path, there.st_uid, there.st_gid)
+            os.chown(path, status.st_uid, status.st_gid)
         return
     # A temporary file is private.
     mask = os.umask(0)
@@ -229,12 +212,12 @@ def _give_permissions(path: Path, like: Path) -> None:
 
 
 @contextmanager
-def _ends_raised() -> Iterator[None]:
+def _signals_raised() -> Iterator[None]:
     """Turn the signals that end a process into exceptions, so that temporary files go away."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    names = [name for name in _ENDS if hasattr(signal, name)]
+    names = [name for name in _ENDING_SIGNALS if hasattr(signal, name)]
     before = {name: signal.signal(getattr(signal, name), _leave) for name in names}
     try:
         yield

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -55,8 +55,8 @@ _LEAST_RMSE = 1e-10
 REFERENCE = next(iter(PAPER_SETS["fig1"]))
 # Sawicki 2021, captions of Figures 4 and 5: the surfaces of Figures 1 and 2.
 PAPER_FIGURES = {"fig4": PAPER_SETS["fig1"][REFERENCE], "fig5": PAPER_SETS["fig2"][REFERENCE]}
-# What a rule keeps whose metric does not say it, in a word that fits beside a row of pictures.
-_KEPT = {"closed-form": "shape"}
+# What a method without a metric keeps, in a word that fits beside a row of pictures.
+_WORDS = {"closed-form": "shape"}
 
 
 @dataclass(frozen=True)
@@ -106,16 +106,8 @@ class Scene:
 
 
 @dataclass(frozen=True)
-class ConversionRule:
-    """One way to convert the parameters: a row of the contact sheet.
-
-    Parameters
-    ----------
-    method : str
-        The conversion method.
-    metric : Metric
-        What it keeps, for the method ``"fit"``.
-    """
+class PictureRule:
+    """A row of the contact sheet: how the parameters are converted, with the metric of a fit."""
 
     method: str
     metric: Metric
@@ -125,34 +117,25 @@ class ConversionRule:
         """The rule and what it keeps, in words."""
         if method_named(self.method).follows_metric:
             return f"{self.method} {self.metric.name} ({self.metric.word})"
-        return f"{self.method} ({_KEPT[self.method]})" if self.method in _KEPT else self.method
+        return f"{self.method} ({_WORDS[self.method]})" if self.method in _WORDS else self.method
 
 
-def default_rules(exposure: float) -> list[ConversionRule]:
+def default_rules(exposure: float) -> list[PictureRule]:
     """Return the paper's conversion (shape), and the fits that keep the light and the picture."""
     return [
-        ConversionRule("closed-form", metric_named("unit")),
-        ConversionRule("fit", metric_named("energy")),
-        ConversionRule("fit", metric_named(f"display:{exposure}")),
+        PictureRule("closed-form", metric_named("unit")),
+        PictureRule("fit", metric_named("energy")),
+        PictureRule("fit", metric_named(f"display:{exposure}")),
     ]
 
 
 @dataclass(frozen=True)
 class Rendering:
-    """One surface's picture.
+    """The pictures of one surface, which is an endpoint and the stored value of its parameter.
 
-    Parameters
-    ----------
-    end : Endpoint
-        The distribution and the form of its parameter.
-    value : float
-        The parameter in that form.
-    image : numpy.ndarray, shape (size, size), or (3, size, size) in colour
-        Linear light, relative to the reference's peak, in colour that of its brightest channel.
-    closeup : numpy.ndarray
-        The highlight alone, in the shape of the image; the image itself where it is large.
-    section : numpy.ndarray, shape (n,)
-        Luminance along the line through the highlight, relative to the reference's peak.
+    Image and close-up, of the highlight alone, are linear light relative to the reference's peak,
+    in shape (size, size), or (3, size, size) in colour; the section is the luminance along the line
+    through the highlight.
     """
 
     end: Endpoint
@@ -181,21 +164,10 @@ class Rendering:
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """A reference's picture and those of its substitutes under each rule.
+class PictureComparison:
+    """A reference's picture and those of its substitutes under each rule, by its words.
 
-    Parameters
-    ----------
-    scene : Scene
-        What was rendered.
-    reference : Rendering
-        The picture that the others are compared with.
-    rows : dict
-        From rules in words to the substitutes' pictures.
-    position : numpy.ndarray, shape (n,)
-        Of the section, in radii.
-    frame : Frame
-        What the close-ups show.
+    `position` is that along the section, in radii; `frame` is what the close-ups show.
     """
 
     scene: Scene
@@ -213,11 +185,7 @@ class Comparison:
         """Return for each picture its parameter and how far it is from the reference."""
         displayed = self.reference.displayed(self.scene.exposure)
         return [
-            {
-                "conversion": rule,
-                "distribution": substitute.name,
-                "parameter": substitute.value,
-            }
+            {"conversion": rule, "distribution": substitute.name, "parameter": substitute.value}
             | self._errors(substitute, displayed)
             for rule, renderings in self.rows.items()
             for substitute in renderings
@@ -246,8 +214,8 @@ class Comparison:
         difference = substitute.displayed_closeup(exposure) - ours
         if difference.ndim == 2:
             return difference
-        largest = np.abs(difference).argmax(axis=0)
-        return np.take_along_axis(difference, largest[None], axis=0)[0]
+        largest = np.abs(difference).argmax(axis=0, keepdims=True)
+        return np.take_along_axis(difference, largest, axis=0)[0]
 
     def section_rows(self) -> tuple[list[str], list[dict[str, float]]]:
         """Return the cross-section as columns and rows: position, then luminances."""
@@ -274,21 +242,26 @@ class _Surface:
     def lobe(self) -> tuple[Distribution, float]:
         return self.end.distribution, self.end.decode_one(self.value)
 
+    def converted(self, end: Endpoint, rule: PictureRule) -> _Surface:
+        """Return the surface with another distribution."""
+        value = convert(self.value, self.end, end, rule.method, metric=rule.metric)
+        return _Surface(end, float(value))
+
 
 def compare(
     value: float,
-    rules: Sequence[ConversionRule],
+    rules: Sequence[PictureRule],
     scene: Scene,
     source: str | Endpoint = REFERENCE,
     targets: Sequence[str | Endpoint] = DRAWN,
-) -> Comparison:
+) -> PictureComparison:
     """Render a surface and its substitutes.
 
     Parameters
     ----------
     value : float
         The parameter of the surface, in the form in which the source stores it.
-    rules : sequence of Rule
+    rules : sequence of PictureRule
         How it is converted.
     scene : Scene
         What is rendered.
@@ -302,26 +275,16 @@ def compare(
         If a conversion has no answer or the highlight is too small to be seen.
     """
     reference = _Surface(one_parameter_endpoint(source), float(value))
-    mdf, parameter = reference.lobe
     ends = [one_parameter_endpoint(target) for target in targets]
-    converted = {
-        rule.label: [
-            _Surface(
-                end, float(convert(value, reference.end, end, rule.method, metric=rule.metric))
-            )
-            for end in ends
-        ]
-        for rule in rules
-    }
+    rows = {rule.label: [reference.converted(end, rule) for end in ends] for rule in rules}
+    mdf, parameter = reference.lobe
     extent = highlight_extent(float(lobe_extent(mdf, np.asarray(parameter))), LIGHTS[scene.light])
     frame = _closeup_frame(extent, scene.size)
     position, normals = cross_section(_SECTION_POINTS, min(extent, 1.0))
-    substitutes = [surface for surfaces in converted.values() for surface in surfaces]
-    rendered = _render([reference, *substitutes], scene, normals, frame)
-    relative = _scale(rendered[reference])
-    shown = {surface: relative(one) for surface, one in rendered.items()}
-    rows = {label: [shown[one] for one in surfaces] for label, surfaces in converted.items()}
-    return Comparison(scene, shown[reference], rows, position, frame)
+    surfaces = [reference, *(surface for row in rows.values() for surface in row)]
+    shown = _relative(_render(surfaces, scene, normals, frame), reference)
+    pictures = {label: [shown[surface] for surface in row] for label, row in rows.items()}
+    return PictureComparison(scene, shown[reference], pictures, position, frame)
 
 
 def _closeup_frame(extent: float, size: int) -> Frame:
@@ -360,14 +323,17 @@ def _render(
     }
 
 
-def _scale(reference: Rendering) -> Callable[[Rendering], Rendering]:
-    """Return what makes renderings relative to the reference's peak, and sections luminances.
+def _relative(
+    rendered: Mapping[_Surface, Rendering], source: _Surface
+) -> dict[_Surface, Rendering]:
+    """Return renderings relative to the reference's peak, their sections as luminances.
 
     Raises
     ------
     MdfconvError
         If the picture misses the peak.
     """
+    reference = rendered[source]
     if reference.image.max() < _LEAST_PEAK * reference.section.max():
         raise MdfconvError(
             f"the highlight of {reference.name} {reference.value_text} "
@@ -379,12 +345,15 @@ def _scale(reference: Rendering) -> Callable[[Rendering], Rendering]:
     peak = max(reference.image.max(), reference.section.max())
     pixels = reference.image.reshape(*reference.image.shape[:-2], -1)
     brightest = max(_luminance(pixels).max(), _luminance(reference.section).max())
-    return lambda rendering: replace(
-        rendering,
-        image=rendering.image / peak,
-        closeup=rendering.closeup / peak,
-        section=_luminance(rendering.section) / brightest,
-    )
+    return {
+        surface: replace(
+            rendering,
+            image=rendering.image / peak,
+            closeup=rendering.closeup / peak,
+            section=_luminance(rendering.section) / brightest,
+        )
+        for surface, rendering in rendered.items()
+    }
 
 
 def _luminance(light: Array) -> Array:

@@ -20,9 +20,10 @@ VIEW = np.array([0.0, 0.0, 1.0])
 LIGHT = np.array([-0.5, 0.5, np.sqrt(0.5)])  # 45° off the viewer, from above left
 _AREA_HALF_SIDE = 0.15  # of the distance to the square light
 _AREA_SAMPLES = 8  # a side
-# Pairs of Gauss's nodes a side for each unit of half the range of t, and the least depth of what is
-# mirrored.
-_NODES, _BEHIND = 2, 1e-3
+# Pairs of Gauss's nodes a side for each unit of half the range of t.
+_NODES = 2
+# The least depth of what is mirrored.
+_LEAST_DEPTH = 1e-3
 MARGIN = 1.04  # half the picture, in radii
 # Some twenty vectors for each normal, as many as this, stay in the cache.
 _NORMALS_AT_ONCE = 8192
@@ -30,15 +31,7 @@ _NORMALS_AT_ONCE = 8192
 
 @dataclass(frozen=True)
 class Lights:
-    """Distant light from a set of directions.
-
-    Parameters
-    ----------
-    directions : numpy.ndarray, shape (k, 3)
-        Unit vectors towards the light.
-    irradiance : numpy.ndarray, shape (k,)
-        What each brings to a surface that faces it.
-    """
+    """Distant light: unit vectors towards it, shape (k, 3), and the irradiance of each, (k,)."""
 
     directions: Array
     irradiance: Array
@@ -101,7 +94,7 @@ class _GradedSquare(Lights):
         """Yield samples as `Lights.samples`, more for normals that mirror the square."""
         mirrored = 2 * (normals @ VIEW)[:, None] * normals - VIEW
         # What is mirrored from behind is far from the square.
-        places = mirrored @ _SIDES.T / np.maximum(mirrored @ LIGHT, _BEHIND)[:, None]
+        places = mirrored @ _SIDES.T / np.maximum(mirrored @ LIGHT, _LEAST_DEPTH)[:, None]
         nearest = np.clip(places, -_AREA_HALF_SIDE, _AREA_HALF_SIDE)
         scale = np.maximum(self.width, np.linalg.norm(places - nearest, axis=1))[:, None]
         low = np.arcsinh((-_AREA_HALF_SIDE - nearest) / scale)
@@ -124,21 +117,10 @@ LIGHTS.add("area", _square())
 
 
 def radiance(normals: Array, brdf: Brdf, light: Lights) -> Array:
-    """Return the light that surfaces send to the viewer.
+    """Return the light that surfaces with unit normals, shape (n, 3), send to the viewer.
 
-    Parameters
-    ----------
-    normals : numpy.ndarray, shape (n, 3)
-        Unit normals; where one turns away from the viewer the result is 0.
-    brdf : callable
-        The BRDF, of directions in the frames of the normals; or several, stacked.
-    light : Lights
-        Where the light comes from.
-
-    Returns
-    -------
-    numpy.ndarray, shape (n,), or (3, n) in colour
-        Radiance in units of irradiance per steradian; of several BRDFs they come first.
+    It is 0 where a normal turns away. The shape is (n,), or (3, n) in colour; of several BRDFs,
+    stacked, they come first.
     """
     blocks = np.array_split(normals, max(1, len(normals) // _NORMALS_AT_ONCE))
     return np.concatenate([_radiance(block, brdf, light) for block in blocks], axis=-1)
@@ -163,16 +145,9 @@ def _radiance(normals: Array, brdf: Brdf, light: Lights) -> Array:
 
 @dataclass(frozen=True)
 class Frame:
-    """The pixels of a square picture that show the sphere, or a part of it.
+    """The pixels of a square picture that shows the sphere, or a part of it.
 
-    Parameters
-    ----------
-    size : int
-        Pixels a side.
-    centre : tuple of float
-        What is in the middle of the picture, x and y in radii.
-    half : float
-        Half the picture, in radii.
+    Its centre, x and y, and half its side are in radii.
     """
 
     size: int
@@ -209,15 +184,8 @@ class Frame:
 def cross_section(count: int, width: float) -> tuple[Array, Array]:
     """Return positions from −1 to 1 radius along the line through the highlight, and normals.
 
-    The line runs through the centre of the sphere's disc, towards the light.
-
-    Parameters
-    ----------
-    count : int
-        Twice this many positions, plus one: so many all along the line, so many within the
-        highlight, and its centre.
-    width : float
-        How far from its centre the highlight is resolved, radians.
+    The line runs through the centre of the sphere's disc, towards the light. So many positions are
+    all along it, so many within the width, radians, around the highlight's centre.
     """
     centre = float(np.arccos(half_vector(LIGHT, VIEW)[2]))
     spread = centre + np.linspace(-width, width, count)

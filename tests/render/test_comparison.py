@@ -17,7 +17,7 @@ from mdfconv.fitting.metrics import metric_named
 from mdfconv.render.comparison import (
     DRAWN,
     PAPER_FIGURES,
-    ConversionRule,
+    PictureRule,
     Scene,
     compare,
     default_rules,
@@ -146,8 +146,8 @@ def test_the_rows_say_what_they_keep():
         "closed-form (shape)", "fit energy (light)", "fit display (picture)",
     ]  # fmt: skip
     assert str(default_rules(4.0)[-1].metric) == "display:4"
-    assert ConversionRule("half-angle", metric_named("unit")).label == "half-angle"
-    assert ConversionRule("fit", metric_named("unit")).label == "fit unit (shape)"
+    assert PictureRule("half-angle", metric_named("unit")).label == "half-angle"
+    assert PictureRule("fit", metric_named("unit")).label == "fit unit (shape)"
 
 
 def test_the_papers_pictures_come_back():
@@ -254,7 +254,7 @@ def test_any_form_is_compared_with_any(name):
     value = float(end.encode(np.array(endpoint("beckmann").distribution.parameter.typical_value)))
     if end.distribution.parameter.larger_is_smoother:
         value = float(end.encode(np.array(50.0)))
-    rules = [ConversionRule("fit", metric_named("energy"))]
+    rules = [PictureRule("fit", metric_named("energy"))]
     scene = Scene(size=64)
     from_it = compare(value, rules, scene, name, ["beckmann", "ggx:roughness"])
     assert (from_it.reference.name, from_it.reference.value) == (end.label, value)
@@ -280,9 +280,7 @@ def test_no_text_is_cut_off_or_lies_on_another(targets, name, monkeypatch):
         (d.name for d in DIALECTS if "blinn-phong" in d.owners and d.specular is Specular.no),
         key=len,
     )
-    rules = [
-        ConversionRule("fit", metric_named(kept)) for kept in ("energy", "display:2.25", "unit")
-    ]
+    rules = [PictureRule("fit", metric_named(kept)) for kept in ("energy", "display:2.25", "unit")]
     ends = [longest, "ggx:roughness", "gauss", "schlick", "sawicki", "ggx", "beckmann", "gtr"]
     scene = Scene(size=200, material="polycarbonate", brdf="smoothie-approx")
     value = float(endpoint(longest).encode(np.array(90.0 if name == "whole" else 400.0)))
@@ -293,6 +291,9 @@ def test_no_text_is_cut_off_or_lies_on_another(targets, name, monkeypatch):
     renderer = figure.canvas.get_renderer()
     texts = [*figure.texts, *figure.legends[0].get_texts()]
     texts += [t for axes in figure.axes for t in (axes.title, axes.xaxis.label, axes.yaxis.label)]
+    texts += [t for axes in figure.axes for t in axes.texts]
+    plots = [axes for axes in figure.axes if axes.axison]
+    texts += [t for axes in plots for t in axes.get_xticklabels() if t.get_visible()]
     texts += [figure._suptitle]
     boxes = {t: t.get_window_extent(renderer) for t in set(texts) if t.get_text()}
     for text, box in boxes.items():

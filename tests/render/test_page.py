@@ -16,8 +16,8 @@ from mdfconv.distributions import distribution
 from mdfconv.distributions.endpoint import endpoint
 from mdfconv.fitting.metrics import list_metrics, metric_named
 from mdfconv.light.spectrum import LobeSpectrum
-from mdfconv.render.comparison import ConversionRule, Scene, compare
-from mdfconv.render.comparison_figure import BACKGROUND, _bytes
+from mdfconv.render.comparison import PictureRule, Scene, compare
+from mdfconv.render.comparison_figure import BACKGROUND, displayed_pixels
 from mdfconv.render.page import comparison_page, filled, page_data
 from mdfconv.render.sphere import Frame
 from tests.cli.runner import run
@@ -242,11 +242,11 @@ def test_halves_are_the_pictures_of_compare(number, light, m_b, tmp_path):
     page = built("beckmann", "ggx")
     ours, _ = opened(tmp_path, page, show(number, m_b))
     ours = np.reshape(ours, (SIZE, SIZE))
-    rule = ConversionRule("fit", metric_named("environment"))
+    rule = PictureRule("fit", metric_named("environment"))
     pictures = compare(m_b, [rule], Scene(light=light, size=SIZE), targets=["ggx"])
     background = (1 - Frame(SIZE).normals()[1].reshape(SIZE, SIZE)) * BACKGROUND
     source, target = (
-        _bytes(rendering.image + background)[..., 0].astype(int)
+        displayed_pixels(rendering.image + background)[..., 0].astype(int)
         for rendering in (pictures.reference, pictures.rows[rule.label][0])
     )
     assert np.ptp(ours) > 200

@@ -104,7 +104,7 @@ class MtlConversion(FileConversion):
 
 
 @dataclass(frozen=True)
-class _ShinyBlock:
+class _SourceLines:
     """The statements of one material that are converted; of several readers take the last."""
 
     block: MaterialBlock
@@ -200,7 +200,7 @@ def _says_something(line: Line) -> bool:
 
 def _sources(
     blocks: Sequence[MaterialBlock], keyword: bytes
-) -> tuple[list[_ShinyBlock], list[MaterialProblem]]:
+) -> tuple[list[_SourceLines], list[MaterialProblem]]:
     """Return what is converted of the materials that have it, and what is not a number."""
     sources, problems = [], []
     for block in blocks:
@@ -211,11 +211,11 @@ def _sources(
             except MdfconvError as error:
                 problems.append(MaterialProblem(line.number, str(error)))
         if numbers:
-            sources.append(_ShinyBlock(block, [line for line, _ in numbers], numbers[-1][1]))
+            sources.append(_SourceLines(block, [line for line, _ in numbers], numbers[-1][1]))
     return sources, problems
 
 
-def _converted(sources: Sequence[_ShinyBlock], to: str, metric: Metric) -> list[MtlMaterial]:
+def _converted(sources: Sequence[_SourceLines], to: str, metric: Metric) -> list[MtlMaterial]:
     """Return the conversion of each material."""
     # A library repeats its values.
     values, index = np.unique(np.array([each.value for each in sources]), return_inverse=True)
@@ -230,7 +230,7 @@ def _converted(sources: Sequence[_ShinyBlock], to: str, metric: Metric) -> list[
     ]
 
 
-def _material(source: _ShinyBlock, shininess: float, roughness: float, rmse: float) -> MtlMaterial:
+def _material(source: _SourceLines, shininess: float, roughness: float, rmse: float) -> MtlMaterial:
     notes = []
     if shininess == 0:
         notes.append("Ns 0 is no highlight: Pr 1")

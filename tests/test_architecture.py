@@ -47,9 +47,6 @@ ABOUT_PARTICULAR_ONES = {
 }
 # Modules outside the command line that may quote options, each with the reason.
 QUOTES_OPTIONS = {
-    "scene/material_files.py": "where the command line says that files go",
-    "measured/analysis.py": "limits that are read from the command line",
-    "measured/readers/text.py": "how the command line says what angles are of",
     "measured/report.py": "by which metric the page converts",
 }
 # The pages of studies say by which commands they are made.

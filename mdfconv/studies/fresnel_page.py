@@ -12,7 +12,7 @@ from mdfconv.distributions.evaluation import Array
 from mdfconv.output.figures import PAGE, encoded, new_figure
 from mdfconv.output.records import csv_text, markdown_text, rounded_rows
 from mdfconv.studies.fresnel import EDGES, FresnelFit, fit, grid, rescaled
-from mdfconv.studies.pages import Contents, fill, pivot
+from mdfconv.studies.pages import PageFiles, fill, pivot
 
 COLUMNS = ("curve", "a", "b", "weighted_rms", "cosine", "max_error", "rms_error")
 _DRAWN_IORS = (1.33, 1.4, 1.5)  # water, the article's, glass
@@ -43,7 +43,7 @@ def error_rows(fitted: FresnelFit) -> list[dict[str, Any]]:
     return rows
 
 
-def fresnel() -> Contents:
+def fresnel() -> PageFiles:
     """Return Smoothie's Fresnel term beside the exact curves."""
     fitted = fit()
     rows = error_rows(fitted)
@@ -73,7 +73,7 @@ def fresnel() -> Contents:
     columns |= {f"exact {ior:g}": rescaled(cosine, ior) for ior in _DRAWN_IORS}
     columns |= {name: curve(cosine) for name, curve in fitted.curves().items()}
     table = csv_text(list(columns), rounded_rows(columns))
-    return Contents([page, table, draw_fresnel(fitted)], figures)
+    return PageFiles([page, table, draw_fresnel(fitted)], figures)
 
 
 def draw_fresnel(fitted: FresnelFit, dpi: int = 110) -> bytes:

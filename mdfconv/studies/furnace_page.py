@@ -15,7 +15,7 @@ from mdfconv.studies.furnace import (
     furnace_model,
     printed_energy_response,
 )
-from mdfconv.studies.pages import Contents, fill, pivot
+from mdfconv.studies.pages import PageFiles, fill, pivot
 
 _COSINES = np.linspace(0, 1, 21)
 # The rows of the cosines that the page shows: 0, 0.1, 0.5 and 1.
@@ -54,7 +54,7 @@ _PANELS: dict[str, tuple[str, _Models]] = {
 _RESPONSE_ALPHAS = (0.01, 0.1, 0.25, 0.5, 1.0)
 
 
-def furnace() -> Contents:
+def furnace() -> PageFiles:
     """Return the white furnace of the BRDFs."""
     albedos = {
         panel: {
@@ -95,7 +95,7 @@ def furnace() -> Contents:
     error = max(abs(albedo - 1) for name in _EXACT for albedo in columns[name])
     titled = {title: albedos[panel] for panel, (title, _) in _PANELS.items()}
     picture = draw_albedo(_COSINES.tolist(), titled)
-    return Contents([page, csv_text(list(rows[0]), rows), picture], {"error": error})
+    return PageFiles([page, csv_text(list(rows[0]), rows), picture], {"error": error})
 
 
 def draw_albedo(

@@ -23,7 +23,7 @@ from mdfconv.scene.shininess import (
     importer_roughness,
     roughness_of,
 )
-from mdfconv.studies.pages import Contents, fill, pivot
+from mdfconv.studies.pages import PageFiles, fill, pivot
 
 _EXPONENTS = np.geomspace(1, 1e4, 81)
 # Of the roughness that is asked for.
@@ -40,7 +40,7 @@ _OUR_STYLES = {
 _DASHES = ("-", (0, (6, 2)), (0, (2, 1)), "-.")
 
 
-def importers() -> Contents:
+def importers() -> PageFiles:
     """Return what importers make of a Wavefront exponent, beside the best fit."""
     curves, rules = _curves(), _rules()
     low, high = float(_EXPONENTS[0]), float(_EXPONENTS[-1])
@@ -74,7 +74,7 @@ def importers() -> Contents:
         answers=pivot("Ns", answers),
         **figures,
     )
-    return Contents([page, csv_text(list(curves), rounded_rows(curves)), _draw(curves)], figures)
+    return PageFiles([page, csv_text(list(curves), rounded_rows(curves)), _draw(curves)], figures)
 
 
 def _curves() -> dict[str, Array]:

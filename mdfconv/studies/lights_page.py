@@ -49,7 +49,7 @@ from mdfconv.fitting.solve import fit
 from mdfconv.output.figures import PAGE, encoded, new_figure
 from mdfconv.output.records import csv_text, rounded_rows
 from mdfconv.studies.bench import as_wide
-from mdfconv.studies.pages import Contents, fill, pivot
+from mdfconv.studies.pages import PageFiles, fill, pivot
 
 LINEAR, FLIP = "linear RMSE", "HDR-FLIP"
 _COLUMNS = {LINEAR: "linear_rmse", "sRGB RMSE": "srgb_rmse", FLIP: "hdr_flip"}
@@ -208,7 +208,7 @@ def _width_power(mdf: Distribution) -> float:
     return -2 if mdf.parameter.larger_is_smoother else 1
 
 
-def lights() -> Contents:
+def lights() -> PageFiles:
     """Return the evidence for the metrics: theory, rendered spheres, constants."""
     from scipy.stats import spearmanr
 
@@ -248,7 +248,7 @@ def lights() -> Contents:
     ]
     rows = [one.record() for one in constants]
     tables = [csv_text(list(table[0]), table) for table in (cases, rows)]
-    return Contents([page, *tables, draw_lights(renders, exponents, metrics)], figures)
+    return PageFiles([page, *tables, draw_lights(renders, exponents, metrics)], figures)
 
 
 def _fitted(target: str, m_b: Array, metric: str) -> Array:

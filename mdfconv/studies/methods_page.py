@@ -18,7 +18,7 @@ from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.output.records import csv_text
 from mdfconv.recommend import answers
 from mdfconv.studies.bench import as_wide
-from mdfconv.studies.pages import Contents, fill, pivot
+from mdfconv.studies.pages import PageFiles, fill, pivot
 
 # Beckmann's m_B for lobes of the same half width.
 _RANGES = {
@@ -33,7 +33,7 @@ _REFERENCES = ("fast", "fit")
 _Errors = dict[tuple[str, str, str], list[Array]]
 
 
-def methods() -> Contents:
+def methods() -> PageFiles:
     """Return the methods beside the best fit: the figures for the choice of a default."""
     compared = [one for one in one_parameter_distributions() if one.map_variables is not None]
     pairs = [pair for pair in permutations(compared, 2) if exact_route(*pair) is None]
@@ -59,7 +59,7 @@ def methods() -> Contents:
         rougher=_table(rougher),
         unanswered=f"{min(unanswered):.1%} to {max(unanswered):.1%}",
     )
-    return Contents([page, csv_text(list(rows[0]), rows)], medians["closed-form"])
+    return PageFiles([page, csv_text(list(rows[0]), rows)], medians["closed-form"])
 
 
 def _compare(

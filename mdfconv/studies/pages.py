@@ -14,7 +14,7 @@ from typing import NamedTuple
 from mdfconv.output.records import markdown_text
 
 
-class Contents(NamedTuple):
+class PageFiles(NamedTuple):
     """The contents of the files of a page, and the figures of it that the index has."""
 
     files: Sequence[str | bytes]

@@ -20,7 +20,7 @@ from mdfconv.render.comparison_figure import draw_comparison
 from mdfconv.render.page import filled, page_data
 from mdfconv.scene.shininess import ROUGHNESS
 from mdfconv.studies.error_curves import Curves, curves, draw_errors
-from mdfconv.studies.pages import Contents, fill, pivot
+from mdfconv.studies.pages import PageFiles, fill, pivot
 from mdfconv.studies.table2 import (
     AGREEMENT,
     COLUMNS,
@@ -37,7 +37,7 @@ _STATED = (10, 40, 100, 1000)
 _FIGURE_DPI, _PICTURE_SIZE = 110, 192
 
 
-def table2() -> Contents:
+def table2() -> PageFiles:
     """Return Table 2 and the printed cells that do not come back."""
     rows = fit_table(*paper_sweep(), metric_named(_UNIT))
     cells = [vars(cell) for cell in printed_cells(rows)]
@@ -55,10 +55,10 @@ def table2() -> Contents:
         missed_table=markdown_text(columns, missed),
         **figures,
     )
-    return Contents([page, csv_text(COLUMNS, rows)], figures)
+    return PageFiles([page, csv_text(COLUMNS, rows)], figures)
 
 
-def table2_by_metric() -> Contents:
+def table2_by_metric() -> PageFiles:
     """Return the table for the metrics that the paper does not have."""
     files, links = [], []
     for name in list_metrics()[1:]:
@@ -74,10 +74,10 @@ def table2_by_metric() -> Contents:
         )
         files += [page, csv_text(COLUMNS, rows)]
         links.append(f"[table2-{name}.md](table2-{name}.md)")
-    return Contents(files, {"links": ", ".join(links)})
+    return PageFiles(files, {"links": ", ".join(links)})
 
 
-def closed_forms() -> Contents:
+def closed_forms() -> PageFiles:
     """Return the paper's coefficients beside refitted ones."""
     rows = refit_rows([metric_named(name) for name in list_metrics()])
     coefficients = [(row["formula"], "a, b", row["printed"]) for row in rows]
@@ -100,10 +100,10 @@ def closed_forms() -> Contents:
         **worst,
     )
     shown = [row | {error: f"{row[error]:.4g}" for error in worst} for row in rows]
-    return Contents([page, csv_text(list(shown[0]), shown)], worst)
+    return PageFiles([page, csv_text(list(shown[0]), shown)], worst)
 
 
-def errors() -> Contents:
+def errors() -> PageFiles:
     """Return Figures 1 and 2, and their maxima beside the paper's prose."""
     drawn = {name: curves(parameters) for name, parameters in PAPER_SETS.items()}
     maxima = [{"figure": name} | row for name, each in drawn.items() for row in each.maxima()]
@@ -118,7 +118,7 @@ def errors() -> Contents:
     files: list[str | bytes] = [page]
     for name, each in drawn.items():
         files += [draw_errors(each, f"Sawicki 2021, {name}", dpi=_FIGURE_DPI), each.error_text()]
-    return Contents(files, figures)
+    return PageFiles(files, figures)
 
 
 def _largest(drawn: Curves) -> dict[str, float]:
@@ -126,7 +126,7 @@ def _largest(drawn: Curves) -> dict[str, float]:
     return {row["distribution"]: row["max_error_percent"] / 100 for row in drawn.maxima()}
 
 
-def pictures() -> Contents:
+def pictures() -> PageFiles:
     """Return Figures 4 and 5: pictures, sections through the highlight, and their errors."""
     files: list[str | bytes] = []
     rows: list[dict[str, Any]] = []
@@ -146,10 +146,10 @@ def pictures() -> Contents:
     }
     columns = [name for name in rows[0] if not name.startswith("psnr")]
     page = fill("pictures", table=markdown_text(columns, rows), **figures)
-    return Contents([page, *files], figures)
+    return PageFiles([page, *files], figures)
 
 
-def comparison() -> Contents:
+def comparison() -> PageFiles:
     """Return the page for a browser: the reference and what most renderers have, with sliders."""
     data = page_data(*endpoints(REFERENCE, ROUGHNESS))
-    return Contents([filled(data)], {"interpolation": data["interpolation"]})
+    return PageFiles([filled(data)], {"interpolation": data["interpolation"]})

@@ -1,6 +1,6 @@
 """The report folder: pages, their tables and pictures, and the index to them.
 
-A new page is a template in ``pages/``, a function that returns its `Contents`, an entry in `PAGES`
+A new page is a template in ``pages/``, a function that returns its `PageFiles`, an entry in `PAGES`
 and a row in ``pages/README.md``.
 """
 
@@ -20,7 +20,7 @@ from mdfconv.studies.furnace_page import furnace
 from mdfconv.studies.importers_page import importers
 from mdfconv.studies.lights_page import lights
 from mdfconv.studies.methods_page import methods
-from mdfconv.studies.pages import Contents, fill
+from mdfconv.studies.pages import PageFiles, fill
 from mdfconv.studies.stability_page import stability
 
 
@@ -31,7 +31,7 @@ class Page:
     Slow ones are begun first, so that no process ends long after the others.
     """
 
-    make: Callable[[], Contents]
+    make: Callable[[], PageFiles]
     files: Sequence[str]
     slow: bool = False
 
@@ -67,7 +67,7 @@ def build(advance: Callable[[int], None]) -> dict[str, bytes]:
     return files | {INDEX: file_bytes(fill("README", **figures))}
 
 
-def made(pages: Sequence[Page], processes: int | None = None) -> Iterator[Contents]:
+def made(pages: Sequence[Page], processes: int | None = None) -> Iterator[PageFiles]:
     """Yield the contents of pages in their order.
 
     `processes` make them, as many as there are processors by default; with 1 the caller's own.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from operator import attrgetter
 
 from mdfconv.output.records import csv_text
-from mdfconv.studies.pages import Contents, fill, pivot
+from mdfconv.studies.pages import PageFiles, fill, pivot
 from mdfconv.studies.stability import Finding, audit
 
 _COLUMNS = ("distribution", "rule", "regime", "dtype", "cases", "out_of_range", "error", "textbook")
@@ -16,7 +16,7 @@ _NO_DIGIT, _FAILS = "1", "fails"
 _NO_REFERENCES = "—"
 
 
-def stability() -> Contents:
+def stability() -> PageFiles:
     """Return the audit of hard cases.
 
     Errors are orders of magnitude, rounded up: their digits differ from one processor to the
@@ -42,7 +42,7 @@ def stability() -> Contents:
         | {name: _magnitude(getattr(finding, name)) for name in ("error", "textbook")}
         for finding in findings
     ]
-    return Contents([page, csv_text(_COLUMNS, rows)], figures)
+    return PageFiles([page, csv_text(_COLUMNS, rows)], figures)
 
 
 def _table(findings: Sequence[Finding], row: str, column: str) -> str:

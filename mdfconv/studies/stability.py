@@ -99,7 +99,7 @@ COLUMNS = [field.name for field in fields(Finding) if field.name != "round_trip"
 
 
 @dataclass(frozen=True)
-class Comparison:
+class HardCases:
     """Results for some cases of a group beside exact ones, and what each case is, in words.
 
     The textbook's results are None where nothing is printed.
@@ -114,10 +114,10 @@ class Comparison:
     round_trip: bool = False
 
 
-def findings(audited: str, comparisons: Iterable[Comparison]) -> Iterator[Finding]:
+def findings(audited: str, cases: Iterable[HardCases]) -> Iterator[Finding]:
     """Yield the worst of each group of a distribution, in the order of their first cases."""
-    groups: dict[tuple[str, str, np.dtype], list[Comparison]] = {}
-    for each in comparisons:
+    groups: dict[tuple[str, str, np.dtype], list[HardCases]] = {}
+    for each in cases:
         groups.setdefault((each.rule, each.regime, each.values.dtype), []).append(each)
     for (rule, regime, dtype), members in groups.items():
         errors = [e for each in members for e in relative_errors(each.values, each.exact)]
@@ -198,7 +198,7 @@ def audit_kernels(chosen: Sequence[Distribution]) -> Iterator[Finding]:
         for dtype, rows_of in stored.items():
             rows = rows_of.get(audited.name) or rows_of.get(_same_function(audited), [])
             if rows:
-                yield from findings(audited.name, _kernel_comparisons(audited, rows, dtype))
+                yield from findings(audited.name, _kernel_cases(audited, rows, dtype))
             else:
                 group = (audited.name, "unit", "no stored references", np.dtype(dtype).name)
                 yield Finding(*group, 0, 0, error="", error_in_eps="", textbook="", worst="")
@@ -215,7 +215,7 @@ def _same_function(audited: Distribution) -> str:
     return equal.name if equal and equal.same_lobe and equal.same_parameter else ""
 
 
-def _kernel_comparisons(audited: Distribution, rows: _Rows, dtype: Any) -> Iterator[Comparison]:
+def _kernel_cases(audited: Distribution, rows: _Rows, dtype: Any) -> Iterator[HardCases]:
     for row in rows:
         form, parameter, gamma = row["form"], row["parameter"], row["gamma"]
         angles = row["beta"].split()
@@ -228,7 +228,7 @@ def _kernel_comparisons(audited: Distribution, rows: _Rows, dtype: Any) -> Itera
         # float16 overflows where the normalized form of a mirror-smooth surface exceeds 65504.
         with np.errstate(over="ignore"):
             values = evaluate(beta, p)
-        yield Comparison(
+        yield HardCases(
             form,
             row["regime"],
             values,
@@ -319,9 +319,9 @@ def _converted(values: Array, source: Distribution, target: Distribution, method
         return convert(values, Endpoint(source), Endpoint(target), method.name)
 
 
-def _conversion(method: Method, batch: _Batch, dtype: Any) -> Comparison:
+def _conversion(method: Method, batch: _Batch, dtype: Any) -> HardCases:
     values = batch.of_type(dtype)
-    return Comparison(
+    return HardCases(
         method.name,
         batch.regime,
         _converted(values, batch.source, batch.target, method),
@@ -331,7 +331,7 @@ def _conversion(method: Method, batch: _Batch, dtype: Any) -> Comparison:
     )
 
 
-def _round_trip(method: Method, batch: _Batch, forward: Comparison) -> list[Comparison]:
+def _round_trip(method: Method, batch: _Batch, forward: HardCases) -> list[HardCases]:
     """Return the way back from a conversion, if the method has one that undoes it."""
     source, target = batch.source, batch.target
     if method.name not in _INVERTIBLE and exact_route(source, target) is None:
@@ -339,7 +339,7 @@ def _round_trip(method: Method, batch: _Batch, forward: Comparison) -> list[Comp
     textbook = forward.textbook
     if textbook is not None:
         textbook = printed_conversion(method, target, source, textbook)
-    back = Comparison(
+    back = HardCases(
         f"{method.name} and back",
         batch.regime,
         _converted(forward.values, target, source, method),
@@ -374,7 +374,7 @@ def _gammas(end: Distribution, values: Array) -> list[Array]:
     return [np.full_like(values, end.gamma)] if end.second_parameter else []
 
 
-def _fits(method: Method, source: Distribution, rows: _Rows) -> Iterator[Comparison]:
+def _fits(method: Method, source: Distribution, rows: _Rows) -> Iterator[HardCases]:
     for (name, regime), group in groupby(rows, lambda row: (row["target"], row["regime"])):
         members = list(group)
         target = distribution(name)
@@ -386,17 +386,17 @@ def _fits(method: Method, source: Distribution, rows: _Rows) -> Iterator[Compari
             for dtype in _CONVERSION_TYPES:
                 ours = convert(batch.of_type(dtype), source.name, name, method.name, metric=metric)
                 rule = f"{method.name} {metric.name}"
-                yield Comparison(rule, regime, ours, None, exact, batch.cases)
+                yield HardCases(rule, regime, ours, None, exact, batch.cases)
 
 
-def _encodings(source: Distribution) -> Iterator[Comparison]:
+def _encodings(source: Distribution) -> Iterator[HardCases]:
     for encoding in source.encodings:
         label = f"{source.name}:{encoding.name}"
         smooth = source.parameter.larger_is_smoother
         for regime, texts in (_ENCODED_EXPONENTS if smooth else _ENCODED).items():
             for dtype in _CONVERSION_TYPES:
                 values = np.array(texts, dtype=dtype)
-                yield Comparison(
+                yield HardCases(
                     f"{encoding.name} and back",
                     regime,
                     convert(convert(values, source.name, label), label, source.name),

@@ -13,7 +13,7 @@ from mdfconv.conversion import method_named
 from mdfconv.distributions.endpoint import Endpoint
 from mdfconv.studies import stability_page
 from mdfconv.studies.stability import (
-    Comparison,
+    HardCases,
     audit,
     findings,
     printed_conversion,
@@ -163,8 +163,8 @@ def test_relative_error(value, exact, error):
 def test_a_missing_answer_is_the_worst():
     values = np.array([1, np.nan, 0.5], dtype=np.float32)
     exact = [Decimal("0.5"), Decimal("0.5"), Decimal("1e-60")]
-    comparison = Comparison("unit", "usual", values, values, exact, ["a", "b", "c"])
-    (finding,) = findings("ggx", [comparison])
+    cases = HardCases("unit", "usual", values, values, exact, ["a", "b", "c"])
+    (finding,) = findings("ggx", [cases])
     assert np.isnan(finding.error)
     assert (finding.worst, finding.textbook, finding.cases, finding.out_of_range) == (
         "b",

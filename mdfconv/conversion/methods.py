@@ -6,7 +6,7 @@ A new method is a class, and its place in the registry at the end.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import ClassVar, NamedTuple
 
@@ -423,6 +423,21 @@ class FreeGammaFit(LeastSquares):
         return Solution(
             fits.parameter.reshape(shape), fits.gamma.reshape(shape), fits.at_limit.reshape(shape)
         )
+
+
+class ExactRoute(Method):
+    """The steps between distributions that have the same lobes, in the place of every method."""
+
+    name = "exact"
+
+    def __init__(self, steps: Sequence[ParameterMap]) -> None:
+        self._steps = steps
+
+    def convert(
+        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
+    ) -> Array:
+        """Take the steps one after the other."""
+        return follow(self._steps, parameter)
 
 
 _REGISTRY: Registry[Method] = Registry("method")

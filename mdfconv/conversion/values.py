@@ -5,14 +5,15 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, compress
+from operator import not_
 from typing import Any, Literal, TypeAlias, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mdfconv.conversion.methods import (
-    Solution,
+    ExactRoute,
     check_covered,
     default_method,
     list_methods,
@@ -20,7 +21,7 @@ from mdfconv.conversion.methods import (
     method_with_free_gamma,
 )
 from mdfconv.distributions import list_distributions
-from mdfconv.distributions.endpoint import Endpoint, endpoints, exact_route, follow
+from mdfconv.distributions.endpoint import Endpoint, endpoints, exact_route
 from mdfconv.distributions.evaluation import Array, Mask, as_operand, in_parts, worth_threads
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError, MdfconvWarning
@@ -164,15 +165,16 @@ def holds_pairs(values: Any) -> bool:
 
 def in_order(values: list[Any], convert_part: Callable[[Any], list[Any]]) -> list[Any]:
     """Convert the pairs of a list and its numbers, each at once; return all in their order."""
-    pairs = [value for value in values if isinstance(value, tuple)]
-    numbers = [value for value in values if not isinstance(value, tuple)]
+    paired = list(map(_is_pair, map(type, values)))
+    pairs = list(compress(values, paired))
+    numbers = list(compress(values, map(not_, paired)))
     for pair in pairs:
         _check_members(pair)
     if any(np.ndim(number) for number in chain(numbers, *pairs)):
         raise MdfconvError("a list with pairs holds numbers and pairs of numbers, not arrays")
     results = iter(convert_part(tuple(map(list, zip(*pairs, strict=True)))))
     others = iter(convert_part(numbers) if numbers else ())
-    return [next(results if isinstance(value, tuple) else others) for value in values]
+    return [next(results if is_pair else others) for is_pair in paired]
 
 
 def _is_pair(kind: type) -> bool:
@@ -224,6 +226,7 @@ class ConversionRule:
             self.method = default_method(*self.pair, metric_given=metric is not None)
         self._same_lobes = exact_route(*self.pair)
         self.exact = None if self.free else self._same_lobes
+        self.solver = self.method if self.exact is None else ExactRoute(self.exact)
 
     def read(self, values: Any) -> tuple[Any, ...]:
         """Return values as real operands: one of numbers, or two of a pair, which is a tuple."""
@@ -266,7 +269,10 @@ class ConversionRule:
             parameter = self.source.decode_legal(np.asarray(axis, dtype=float))
         else:
             parameter = self.source.decode(axis)
-        solution = self.solve(parameter)
+        if self.exact is None:
+            check_covered(self.method, self.metric, *self.ends)
+        with np.errstate(all="ignore"):
+            solution = self.solver.solve(parameter, *self.pair, self.metric)
         stored = self.target.encode(solution.parameter)
         if not gaps and np.isnan(stored).any():
             index, size = int(np.argmax(np.isnan(stored))), np.size(stored)
@@ -274,14 +280,6 @@ class ConversionRule:
             result = solution.parameter.flat[index]
             raise self.refusal(float(parameter.flat[index]), float(result), which)
         return Converted(parameter, stored, *solution)
-
-    def solve(self, parameter: Array) -> Solution:
-        """Return what the target has for parameters, whether it is legal or not."""
-        with np.errstate(all="ignore"):
-            if self.exact is not None:
-                return Solution(np.asarray(follow(self.exact, parameter)))
-            check_covered(self.method, self.metric, *self.ends)
-            return self.method.solve(parameter, *self.pair, self.metric)
 
     def cautions(self, converted: Converted) -> dict[str, Mask]:
         """Return sentences, and of which of the numbers they are true."""

@@ -158,7 +158,7 @@ class StoredConverter:
         if self.target.stored.accepts(np.asarray(number.result)):
             result, limit = number_text(number.result), number_text(self._largest)
             return f"{self.target.label} would be {result}, above {limit}"
-        solved = self.rule.solve(parameter).parameter
+        solved = self._parameters(parameter)
         return self.rule.refusal(float(parameter[0]), float(solved[0])).reason
 
     def _outcome_of_illegal(self, stored: Array) -> NDArray[np.uint8]:
@@ -180,13 +180,18 @@ class StoredConverter:
 
     def _encoded(self, parameter: Array) -> Array:
         """Return what the target would store for parameters, NaN where they have no answer."""
-        results = self.rule.solve(parameter).parameter
+        results = self._parameters(parameter)
         results = np.where(self._pair[1].parameter.accepts(results), results, np.nan)
         if not self.target.encoding:
             return results
         with np.errstate(all="ignore"):
             # Not `Endpoint.encode`: what cannot be stored may be clamped.
             return self.target.encoding.encode(results)
+
+    def _parameters(self, parameter: Array) -> Array:
+        """Return what the method makes of legal parameters."""
+        with np.errstate(all="ignore"):
+            return self.rule.solver.solve(parameter, *self._pair, self.metric).parameter
 
     def _storable(self, result: Array) -> Mask:
         with np.errstate(invalid="ignore"):

@@ -33,10 +33,8 @@ At p = 0 that is the energy metric and at p = 2 the environment metric.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from itertools import permutations
 from typing import Any
 
@@ -49,7 +47,7 @@ from mdfconv.fitting.solve import fit
 from mdfconv.output.figures import PAGE, encoded, new_figure
 from mdfconv.output.records import csv_text, rounded_rows
 from mdfconv.studies.bench import as_wide
-from mdfconv.studies.pages import PageFiles, fill, pivot
+from mdfconv.studies.pages import PageFiles, fill, pivot, read_rows
 
 LINEAR, FLIP = "linear RMSE", "HDR-FLIP"
 _COLUMNS = {LINEAR: "linear_rmse", "sRGB RMSE": "srgb_rmse", FLIP: "hdr_flip"}
@@ -109,8 +107,7 @@ class Renders:
 
 def read_renders() -> Renders:
     """Return the rendered cases that come with the package."""
-    text = files("mdfconv.studies").joinpath("data", "renders.csv").read_text(encoding="utf-8")
-    rows = list(csv.DictReader(text.splitlines()))
+    rows = read_rows("renders.csv")
 
     def numbers(column: str) -> Array:
         return np.array([float(row[column]) for row in rows])

@@ -9,10 +9,8 @@ The paper's closed forms are fits to this table, redone here under every metric.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -27,6 +25,7 @@ from mdfconv.fitting.metrics.base import Unit
 from mdfconv.fitting.problem import FitProblem
 from mdfconv.fitting.quadrature import UniformSamples
 from mdfconv.fitting.solve import fit
+from mdfconv.studies.pages import read_rows
 
 # Between 0 and the limit of a row.
 SAMPLES = 3001
@@ -63,7 +62,7 @@ class Cell:
 
 def paper_sweep() -> tuple[Array, Array]:
     """Return the paper's m_B, unrounded, and the limit of β of each row, radians."""
-    rows = _read("table2_protocol.csv")
+    rows = read_rows("table2_protocol.csv")
     numbers = [[float(row[key]) for row in rows] for key in ("m_b_exact", "beta_max_rad")]
     return np.array(numbers[0]), np.array(numbers[1])
 
@@ -104,20 +103,15 @@ def fit_table(
 
 def printed_cells(ours: list[Row] | None = None) -> Iterator[Cell]:
     """Yield the 153 printed parameters and errors beside ours, fitted anew if not given."""
-    reasons = {(row["m_b"], row["column"]): row["reason"] for row in _read("table2_missed.csv")}
+    reasons = {(row["m_b"], row["column"]): row["reason"] for row in read_rows("table2_missed.csv")}
     ours = fit_table(*paper_sweep(), Unit()) if ours is None else ours
-    for printed, row in zip(_read("table2.csv"), ours, strict=True):
+    for printed, row in zip(read_rows("table2.csv"), ours, strict=True):
         for column in COLUMNS[2:]:
             value, cell = float(printed[column]), (printed["m_b"], column)
             agrees = abs(row[column] / value - 1) <= AGREEMENT
             units = (row[column] - value) / _last_digit(column, printed[column])
             reason = "" if agrees else reasons.get(cell, "unexplained")
             yield Cell(*cell, printed[column], row[column], units, agrees, reason)
-
-
-def _read(name: str) -> list[dict[str, str]]:
-    text = files("mdfconv.studies").joinpath("data", name).read_text()
-    return list(csv.DictReader(text.splitlines()))
 
 
 def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dict[str, Array]:

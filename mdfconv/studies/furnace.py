@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -269,8 +270,8 @@ class _Definition:
 
     name: str
     build: Callable[..., FurnaceModel]
-    option: str = ""
-    distribution: str = ""
+    option: str
+    distribution: str
 
 
 _REGISTRY: Registry[_Definition] = Registry("BRDF")
@@ -321,22 +322,15 @@ def list_models() -> list[str]:
     return _REGISTRY.names
 
 
-def _of_facets(name: str, owner: str, brdf: Callable[..., Brdf], option: str = "") -> _Definition:
-    """Return the definition of a BRDF of half vectors, by the distribution of its facets."""
-
-    def build(parameter: float, **options: str) -> FurnaceModel:
-        surface = Microsurface(distribution(owner), parameter)
-        return _facet_model(brdf(surface, lossless, **options), surface)
-
-    return _Definition(name, build, option, owner)
-
-
 def _masked(surface: Microsurface, fresnel: Fresnel, masking: str = "correlated") -> Brdf:
     return reflection.microfacet(surface, fresnel, MASKINGS[masking](surface))
 
 
-def _facet_model(brdf: Brdf, surface: Microsurface) -> FurnaceModel:
+def _facet_model(
+    owner: str, brdf: Callable[..., Brdf], parameter: float, **options: str
+) -> FurnaceModel:
     """Return the model of a BRDF in half vectors, sampled by the facets of its surface."""
+    surface = Microsurface(distribution(owner), parameter)
 
     def sample(view: Array, u1: Array, u2: Array) -> tuple[Array, Array]:
         if surface.has_visible_normals:
@@ -349,18 +343,10 @@ def _facet_model(brdf: Brdf, surface: Microsurface) -> FurnaceModel:
         return reflect(view, m), reflected_density(density, view, m)
 
     width = float(surface.distribution.peak_alpha(surface.parameter))
-    return FurnaceModel(brdf, width, False, sample)
+    return FurnaceModel(brdf(surface, lossless, **options), width, False, sample)
 
 
-def _original_phong(exponent: float) -> FurnaceModel:
-    return _mirror_model(reflection.original(exponent), exponent)
-
-
-def _modified_phong(exponent: float, normalizer: str = "usual") -> FurnaceModel:
-    return _mirror_model(reflection.modified(exponent, normalizer), exponent)
-
-
-def _mirror_model(brdf: Brdf, exponent: float) -> FurnaceModel:
+def _mirror_model(brdf: Callable[..., Brdf], exponent: float, **options: str) -> FurnaceModel:
     """Return the model of a BRDF around the mirror image of the viewer."""
 
     def sample(view: Array, u1: Array, u2: Array) -> tuple[Array, Array]:
@@ -368,12 +354,13 @@ def _mirror_model(brdf: Brdf, exponent: float) -> FurnaceModel:
         light = cosine_lobe(axis, exponent, u1, u2)
         return light, cosine_lobe_density(axis, exponent, light)
 
-    return FurnaceModel(brdf, 1 / np.sqrt(exponent + 1), True, sample)
+    return FurnaceModel(brdf(exponent, **options), 1 / np.sqrt(exponent + 1), True, sample)
 
 
-def _register(definition: _Definition) -> None:
-    """Register a BRDF, under all names of its distribution if it has that of one."""
-    name, owner = definition.name, definition.distribution
+def _register(name: str, brdf: Callable[..., Brdf], owner: str = "", option: str = "") -> None:
+    """Register a BRDF by the owner of its facets, and under all names of that if it has its."""
+    build = partial(_facet_model, owner, brdf) if owner else partial(_mirror_model, brdf)
+    definition = _Definition(name, build, option, owner)
     if owner == name:
         mdf = distribution(name)
         _REGISTRY.add(name, definition, mdf.aliases, mdf.meant_by)
@@ -382,16 +369,13 @@ def _register(definition: _Definition) -> None:
         _REGISTRY.add(name, definition, meant_by=dict.fromkeys(meant, "phong"))
 
 
-for _definition in (
-    _of_facets("ggx", "ggx", _masked, "masking"),
-    _of_facets("beckmann", "beckmann", _masked, "masking"),
-    _Definition("phong", _original_phong),
-    _Definition("modified-phong", _modified_phong, "normalizer"),
-    _of_facets("smoothie", "smoothie", reflection.smoothie),
-    _of_facets("smoothie-approx", "smoothie", reflection.smoothie_approx),
-    _of_facets("ashikhmin-shirley", "ashikhmin-shirley", reflection.ashikhmin_shirley),
-):
-    _register(_definition)
+_register("ggx", _masked, "ggx", "masking")
+_register("beckmann", _masked, "beckmann", "masking")
+_register("phong", reflection.original)
+_register("modified-phong", reflection.modified, option="normalizer")
+_register("smoothie", reflection.smoothie, "smoothie")
+_register("smoothie-approx", reflection.smoothie_approx, "smoothie")
+_register("ashikhmin-shirley", reflection.ashikhmin_shirley, "ashikhmin-shirley")
 
 
 _COSINES = np.linspace(0, 1, 21)
@@ -399,7 +383,12 @@ _COSINES = np.linspace(0, 1, 21)
 _SHOWN = {"grazing": 0, "nearly_grazing": 2, "oblique": 10, "normal": 20}
 _GAMMA, _ALPHA = 20.0, 0.5
 _EXACT = ("Phong: modified, Arvo", "Phong: modified, Mallett & Yuksel")
-_Models = dict[str, tuple[str, float, dict[str, str]]]
+_Model = tuple[str, float, dict[str, str]]
+_Models = dict[str, _Model]
+
+
+def _modified(normalizer: str) -> _Model:
+    return "modified-phong", _GAMMA, {"normalizer": normalizer}
 
 
 def _smooth_and_rough(*names: str) -> _Models:
@@ -412,13 +401,9 @@ _PANELS: dict[str, tuple[str, _Models]] = {
         f"Phong, γ = {_GAMMA:g}",
         {
             "original": ("phong", _GAMMA, {}),
-            "modified, usual": ("modified-phong", _GAMMA, {"normalizer": "usual"}),
-            "modified, Arvo": ("modified-phong", _GAMMA, {"normalizer": "arvo"}),
-            "modified, Mallett & Yuksel": (
-                "modified-phong",
-                _GAMMA,
-                {"normalizer": "mallett-yuksel"},
-            ),
+            "modified, usual": _modified("usual"),
+            "modified, Arvo": _modified("arvo"),
+            "modified, Mallett & Yuksel": _modified("mallett-yuksel"),
         },
     ),
     "GGX": (

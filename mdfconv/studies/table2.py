@@ -44,22 +44,6 @@ COLUMNS = (
 Row = dict[str, float]
 
 
-@dataclass(frozen=True)
-class Cell:
-    """A printed cell beside ours.
-
-    `units` is the difference in units of the last printed digit; a reason has what does not agree.
-    """
-
-    m_b: str
-    column: str
-    printed: str
-    ours: float
-    units: float
-    agrees: bool
-    reason: str
-
-
 def paper_sweep() -> tuple[Array, Array]:
     """Return the paper's m_B, unrounded, and the limit of β of each row, radians."""
     rows = read_rows("table2_protocol.csv")
@@ -101,17 +85,26 @@ def fit_table(
     return rows
 
 
-def printed_cells(ours: list[Row] | None = None) -> Iterator[Cell]:
-    """Yield the 153 printed parameters and errors beside ours, fitted anew if not given."""
+def printed_cells(ours: list[Row] | None = None) -> Iterator[dict[str, Any]]:
+    """Yield the 153 printed parameters and errors beside ours, fitted anew if not given.
+
+    `units` is the difference in units of the last printed digit; a reason has what does not agree.
+    """
     reasons = {(row["m_b"], row["column"]): row["reason"] for row in read_rows("table2_missed.csv")}
     ours = fit_table(*paper_sweep(), Unit()) if ours is None else ours
     for printed, row in zip(read_rows("table2.csv"), ours, strict=True):
         for column in COLUMNS[2:]:
-            value, cell = float(printed[column]), (printed["m_b"], column)
-            agrees = abs(row[column] / value - 1) <= AGREEMENT
-            units = (row[column] - value) / _last_digit(column, printed[column])
-            reason = "" if agrees else reasons.get(cell, "unexplained")
-            yield Cell(*cell, printed[column], row[column], units, agrees, reason)
+            agrees = abs(row[column] / float(printed[column]) - 1) <= AGREEMENT
+            difference = row[column] - float(printed[column])
+            yield {
+                "m_b": printed["m_b"],
+                "column": column,
+                "printed": printed[column],
+                "ours": row[column],
+                "units": difference / _last_digit(column, printed[column]),
+                "agrees": agrees,
+                "reason": "" if agrees else reasons.get((printed["m_b"], column), "unexplained"),
+            }
 
 
 def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dict[str, Array]:
@@ -273,15 +266,10 @@ def _coefficients(values: Sequence[float]) -> str:
 def _refit_one(form: Law, metric: Metric, x: Array, y: Array) -> Refit:
     from scipy.optimize import least_squares
 
-    def relative(coefficients: Array) -> Array:
+    def relative(coefficients: Sequence[float]) -> Array:
         return form.shape(x, *coefficients) / y - 1
 
     with np.errstate(invalid="ignore"):
         best = least_squares(relative, form.printed, x_scale="jac", xtol=1e-14, ftol=1e-14).x
-    return Refit(
-        form=form,
-        metric=str(metric),
-        coefficients=tuple(best.tolist()),
-        printed_error=float(np.max(np.abs(relative(np.array(form.printed))))),
-        error=float(np.max(np.abs(relative(best)))),
-    )
+    errors = (float(np.max(np.abs(relative(each)))) for each in (form.printed, best))
+    return Refit(form, str(metric), tuple(best.tolist()), *errors)

@@ -19,7 +19,7 @@ from mdfconv.conversion.explanation import remaining_error
 from mdfconv.distributions import distribution, one_parameter_distributions
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.free_gamma import fit_free_gamma
+from mdfconv.fitting.free_gamma import FreeFit, fit_free_gamma
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.metrics.base import Unit
 from mdfconv.fitting.problem import FitProblem
@@ -129,21 +129,18 @@ def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dic
         others = [mdf for mdf in one_parameter_distributions() if mdf not in known]
         targets |= {mdf.name.replace("-", "_"): mdf for mdf in others}
     for column, target in targets.items():
-        gamma = None
-        if target.second_parameter:
-            free = fit_free_gamma(source, m_b, target, metric, samples)
-            best, distance, gamma = free.parameter, free.distance, free.gamma
-            columns |= {column: best, f"gamma_{column}": gamma}
-        else:
-            fixed = fit(source, m_b, target, metric, samples)
-            best, distance = fixed.parameter, fixed.distance
-            columns[column] = best
+        solve = fit_free_gamma if target.second_parameter else fit
+        fitted = solve(source, m_b, target, metric, samples)
+        columns[column] = best = fitted.parameter
+        gamma = fitted.gamma if isinstance(fitted, FreeFit) else None
+        if gamma is not None:
+            columns[f"gamma_{column}"] = gamma
         _check_answers(m_b, best, target.name)
         if samples is None:
             rmse, _ = remaining_error(source, m_b, target, best, metric, gamma)
         else:
             # A degree of freedom is spent for each parameter.
-            rmse = np.sqrt(np.maximum(distance, 0) / (SAMPLES - len(target.parameters)))
+            rmse = np.sqrt(np.maximum(fitted.distance, 0) / (SAMPLES - len(target.parameters)))
         columns[f"rmse_{column}"] = rmse
     return columns
 

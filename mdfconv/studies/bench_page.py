@@ -187,6 +187,9 @@ def draw(measurements: Measurements, dpi: int = 120) -> bytes:
     Low and left is better. What has no error to show is left out.
     """
     figure = new_figure(*_SIZE)
+    # Not before `new_figure` has prepared Matplotlib.
+    from matplotlib.ticker import LogLocator
+
     left, right = figure.subplots(1, 2)
     substitutes = [
         _Point(
@@ -209,23 +212,16 @@ def draw(measurements: Measurements, dpi: int = 120) -> bytes:
         xlabel="time of an evaluation, float32 [ns]",
         ylabel="RMSE of the best fit, unit form",
     )
-    _label_few_decades(left.xaxis)
+    # So few powers of ten that one cannot read between them.
+    left.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    left.xaxis.set_major_formatter("{x:g}")
+    left.xaxis.set_minor_formatter("")
     right.set(
         title=title(measurements, "methods"),
         xlabel="time of a conversion [ns]",
         ylabel="median relative error of the parameter against fit",
     )
     return encoded(figure, dpi=dpi)
-
-
-def _label_few_decades(axis: Any) -> None:
-    """Label an axis that has too few powers of ten to be read between them."""
-    # Not before `new_figure` has prepared Matplotlib.
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(NullFormatter())
 
 
 def _draw_panel(axes: Any, points: Iterable[_Point], colors: dict[str, str]) -> None:

@@ -79,17 +79,14 @@ class FresnelFit:
             "exp(-6x)": lambda cosine: np.exp(-6 * cosine),
         }
 
+    def error(self, curve: Callable[[Array], Array], cosine: Array) -> Array:
+        """Return an approximation less the exact curve."""
+        return curve(cosine) - rescaled(cosine, self.ior)
+
     def weighted_error(self, curve: Callable[[Array], Array]) -> float:
         """Return the root mean square error of an approximation under the weight."""
-        cosine = grid()
-        error = curve(cosine) - rescaled(cosine, self.ior)
-        return float(np.sqrt(np.average(np.square(error), weights=self.weight(cosine))))
-
-    def errors(self, curve: Callable[[Array], Array], low: float, high: float) -> tuple[float, ...]:
-        """Return the maximum and the root mean square error on a range of l·H, unweighted."""
-        cosine = np.linspace(low, high, _POINTS)
-        error = np.abs(curve(cosine) - rescaled(cosine, self.ior))
-        return float(error.max()), float(np.sqrt(np.mean(np.square(error))))
+        squares = np.square(self.error(curve, grid()))
+        return float(np.sqrt(np.average(squares, weights=self.weight(grid()))))
 
 
 def grid() -> Array:
@@ -175,8 +172,9 @@ def error_rows(fitted: FresnelFit) -> list[dict[str, Any]]:
         a, b = fitted.constants.get(name, (None, None))
         weighted = fitted.weighted_error(curve)
         for low, high in [*pairwise(EDGES), (EDGES[0], EDGES[-1])]:
-            largest, rms = fitted.errors(curve, low, high)
-            values = name, a, b, weighted, f"{low:g} to {high:g}", largest, rms
+            error = np.abs(fitted.error(curve, np.linspace(low, high, _POINTS)))
+            unweighted = float(error.max()), float(np.sqrt(np.mean(np.square(error))))
+            values = name, a, b, weighted, f"{low:g} to {high:g}", *unweighted
             rows.append(dict(zip(COLUMNS, values, strict=True)))
     return rows
 
@@ -223,12 +221,11 @@ def draw_fresnel(fitted: FresnelFit) -> bytes:
     for ior, color in zip(iors, _EXACT_COLORS, strict=False):
         curve = rescaled(cosine, ior)
         left.plot(cosine, curve, label=f"exact, IOR {ior:g}", color=color, linewidth=1.1)
-    exact = rescaled(cosine, fitted.ior)
     for name, approximation in fitted.curves().items():
         a_b = fitted.constants.get(name)
         label = f"{name}, a = {a_b[0]:.4f}, b = {a_b[1]:.4f}" if a_b else name
         left.plot(cosine, approximation(cosine), label=label, linewidth=1.6, **_STYLES[name])
-        right.plot(cosine, approximation(cosine) - exact, linewidth=1.6, **_STYLES[name])
+        right.plot(cosine, fitted.error(approximation, cosine), linewidth=1.6, **_STYLES[name])
     left.set(
         xlabel="l·H",
         ylabel="(F − F₀) / (1 − F₀)",

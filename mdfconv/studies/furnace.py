@@ -145,17 +145,15 @@ def sampled_albedo(
     There is one of each for every cosine of the viewer; `seed` is that of the random numbers.
     """
     random = np.random.default_rng(seed)
-    results = [_estimate(model, float(value), random.random((2, count))) for value in cosine]
-    albedo, error = np.array(results).reshape(-1, 2).T
+    estimates = []
+    for value in np.maximum(cosine, _LEAST_COSINE).tolist():
+        view = np.broadcast_to(_viewer(value), (count, 3))
+        light, density = model.sample(view, *random.random((2, count)))
+        reflected = model.brdf(light, view) * light[..., 2]
+        weight = np.where(density > 0, reflected / np.where(density > 0, density, 1), 0)
+        estimates.append((weight.mean(), weight.std(ddof=1) / np.sqrt(count)))
+    albedo, error = np.array(estimates).reshape(-1, 2).T
     return albedo, error
-
-
-def _estimate(model: FurnaceModel, cosine: float, numbers: Array) -> tuple[float, float]:
-    view = np.broadcast_to(_viewer(max(cosine, _LEAST_COSINE)), (*numbers[0].shape, 3))
-    light, density = model.sample(view, *numbers)
-    value = model.brdf(light, view) * light[..., 2]
-    weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
-    return float(weight.mean()), float(weight.std(ddof=1) / np.sqrt(weight.size))
 
 
 def _viewer(cosine: float) -> Array:

@@ -209,6 +209,11 @@ def lights() -> PageFiles:
     """Return the evidence for the metrics: theory, rendered spheres, constants."""
     renders, constants = read_renders(), smooth_constants()
     exponents = np.array([equivalent_exponent(ratio) for ratio in renders.predicted])
+    # The α of a Student-t lobe over Beckmann's m_B is the same at every roughness.
+    ratio, lobe = metric_named("environment").ratio, distribution("student-t")
+    student = {
+        gamma: ratio(distribution("beckmann"), lobe.with_gamma(gamma)) for gamma in (3, 5, 20)
+    }
     smooth = np.array([SMOOTH])
     metrics = {name: _fitted("ggx", smooth, name)[0] / SMOOTH for name in _METRIC_STYLES}
     off = renders.predicted / renders.best[LINEAR] - 1
@@ -229,7 +234,7 @@ def lights() -> PageFiles:
         },
         exponent={"least": exponents.min(), "largest": exponents.max()},
         constants=_constant_table(constants),
-        student={gamma: _student_ratio(gamma) for gamma in (3, 5, 20)},
+        student=student,
         rough=ROUGH,
         deviation=[min(deviations), max(deviations)],
         shifted=np.abs(_fitted("blinn-phong", _M_B, "environment") / (2 / _M_B**2 - 1) - 1).max(),
@@ -248,12 +253,6 @@ def lights() -> PageFiles:
 
 def _fitted(target: str, m_b: Array, metric: str) -> Array:
     return fit(distribution("beckmann"), m_b, distribution(target), metric_named(metric)).parameter
-
-
-def _student_ratio(gamma: float) -> float | None:
-    """Return the α of a Student-t lobe over Beckmann's m_B, at every roughness."""
-    target = distribution("student-t").with_gamma(gamma)
-    return metric_named("environment").ratio(distribution("beckmann"), target)
 
 
 def cost_table(renders: Renders) -> str:

@@ -178,11 +178,9 @@ def substitutes(task: Task, advance: Advance) -> list[Row]:
             (candidate, candidate.parameter.typical_value if np.isnan(fit[0]) else fit[0])
             for candidate, fit in zip(task.candidates, fits, strict=True)
         ]
+        how = task.sizes.angles, task.sizes.rounds, advance
         times = {
-            f"ns_{precision}": evaluation_times(
-                lobes, precision, task.sizes.angles, task.sizes.rounds, advance
-            )
-            for precision in PRECISIONS
+            f"ns_{precision}": evaluation_times(lobes, precision, *how) for precision in PRECISIONS
         }
         for place, candidate in enumerate(task.candidates):
             row = {

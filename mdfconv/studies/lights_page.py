@@ -210,10 +210,9 @@ def lights() -> PageFiles:
     renders, constants = read_renders(), smooth_constants()
     exponents = np.array([equivalent_exponent(ratio) for ratio in renders.predicted])
     # The α of a Student-t lobe over Beckmann's m_B is the same at every roughness.
-    ratio, lobe = metric_named("environment").ratio, distribution("student-t")
-    student = {
-        gamma: ratio(distribution("beckmann"), lobe.with_gamma(gamma)) for gamma in (3, 5, 20)
-    }
+    beckmann, lobe = distribution("beckmann"), distribution("student-t")
+    ratio = metric_named("environment").ratio
+    student = {gamma: ratio(beckmann, lobe.with_gamma(gamma)) for gamma in (3, 5, 20)}
     smooth = np.array([SMOOTH])
     metrics = {name: _fitted("ggx", smooth, name)[0] / SMOOTH for name in _METRIC_STYLES}
     off = renders.predicted / renders.best[LINEAR] - 1

@@ -14,18 +14,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from mdfconv.brdf import reflection
+from mdfconv.brdf import microfacet, reflection
 from mdfconv.brdf.fresnel import Fresnel, lossless
-from mdfconv.brdf.microfacet import (
-    MASKINGS,
-    Brdf,
-    Microsurface,
-    direction,
-    dot,
-    frames,
-    mirrored,
-    reflect,
-)
+from mdfconv.brdf.microfacet import Brdf, Microsurface, direction, dot, reflect
 from mdfconv.distributions import distribution
 from mdfconv.distributions.evaluation import Array, gauss_legendre, gauss_panels
 from mdfconv.errors import MdfconvError
@@ -43,7 +34,7 @@ def cosine_lobe(axis: Array, exponent: float, u1: Array, u2: Array) -> Array:
     # 1 − cos θ = −expm1(ln(1−u)/(γ+1)) keeps the digits of narrow lobes.
     drop = -np.expm1(np.log1p(-u1) / (exponent + 1))
     local = direction(2 * np.arcsin(np.sqrt(0.5 * drop)), 2 * np.pi * u2)
-    drawn: Array = np.einsum("...i,...ij->...j", local, frames(axis))
+    drawn: Array = np.einsum("...i,...ij->...j", local, microfacet.frames(axis))
     return drawn
 
 
@@ -321,7 +312,7 @@ def list_models() -> list[str]:
 
 
 def _masked(surface: Microsurface, fresnel: Fresnel, masking: str = "correlated") -> Brdf:
-    return reflection.microfacet(surface, fresnel, MASKINGS[masking](surface))
+    return reflection.microfacet(surface, fresnel, microfacet.MASKINGS[masking](surface))
 
 
 def _facet_model(
@@ -348,7 +339,7 @@ def _mirror_model(brdf: Callable[..., Brdf], exponent: float, **options: str) ->
     """Return the model of a BRDF around the mirror image of the viewer."""
 
     def sample(view: Array, u1: Array, u2: Array) -> tuple[Array, Array]:
-        axis = mirrored(view)
+        axis = microfacet.mirrored(view)
         light = cosine_lobe(axis, exponent, u1, u2)
         return light, cosine_lobe_density(axis, exponent, light)
 
@@ -406,7 +397,7 @@ _PANELS: dict[str, tuple[str, _Models]] = {
     ),
     "GGX": (
         f"GGX, α = {_ALPHA:g}, by masking",
-        {name: ("ggx", _ALPHA, {"masking": name}) for name in MASKINGS.names},
+        {name: ("ggx", _ALPHA, {"masking": name}) for name in microfacet.MASKINGS.names},
     ),
     "GGX and Beckmann": ("GGX and Beckmann, correlated", _smooth_and_rough("ggx", "beckmann")),
     "Smoothie": ("Smoothie", _smooth_and_rough("smoothie", "smoothie-approx")),

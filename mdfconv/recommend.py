@@ -76,11 +76,8 @@ def evaluation_times(
     [0, π/2]; `rounds` and `advance` are those of `interleave`.
     """
     beta = np.linspace(0, np.pi / 2, angles, dtype=precision)
-    functions = {
-        str(number): partial(candidate.unit, beta, parameter)
-        for number, (candidate, parameter) in enumerate(lobes)
-    }
-    times = interleave(functions, rounds, advance)
+    evaluations = [partial(candidate.unit, beta, parameter) for candidate, parameter in lobes]
+    times = interleave(dict(enumerate(evaluations)), rounds, advance)
     return [spread(1e9 * samples / angles) for samples in times.values()]
 
 
@@ -137,16 +134,14 @@ class Recommendation:
 
     def records(self) -> list[dict[str, Any]]:
         """Return the candidates as rows of a table, the chosen ones first."""
+        uses = _uses(self.chosen) | {candidate: [] for candidate in self.others}
         return [
             vars(candidate)
             | {
                 "within": candidate.max_error <= self.tolerance,
-                "chosen": "both" if len(uses) > 1 else "".join(uses),
+                "chosen": "both" if len(names) > 1 else "".join(names),
             }
-            for candidate, uses in (
-                *_uses(self.chosen).items(),
-                *((candidate, []) for candidate in self.others),
-            )
+            for candidate, names in uses.items()
         ]
 
 
@@ -199,12 +194,10 @@ def recommend(
     candidates = _timed_fits(source, surface, list(targets.values()), metric)
     cheapest = {use: choose(candidates, tolerance, use) for use in _COSTS}
     conversions = {
-        candidate: candidate
-        if candidate.method == NOT_CONVERTED
-        else _cheapest_conversion(
-            source, surface, targets[candidate.distribution], metric, candidate, tolerance
+        one: _cheapest_conversion(
+            source, surface, targets[one.distribution], metric, one, tolerance
         )
-        for candidate in dict.fromkeys(cheapest.values())
+        for one in dict.fromkeys(cheapest.values())
     }
     chosen = {use: conversions[candidate] for use, candidate in cheapest.items()}
     others = sorted(
@@ -264,36 +257,32 @@ def _cheapest_conversion(
     tolerance: float,
 ) -> Candidate:
     """Return a candidate by the cheapest method that keeps it within the tolerance."""
-    conversions: dict[str, Candidate] = {}
-    runs: dict[str, Callable[[], object]] = {}
+    if candidate.method == NOT_CONVERTED:
+        return candidate
+    trials: dict[Candidate, Callable[[], object]] = {}
     for method in covering(source, target, metric):
         convert = partial(answers, method, surface, source, target, metric)
         result = convert()
         if np.isnan(result[0]):
             continue
-        rmse, max_error = (
-            float(error[0]) for error in remaining_error(source, surface, target, result, metric)
+        rmse, largest = remaining_error(source, surface, target, result, metric)
+        trial = replace(
+            candidate,
+            parameter=float(result[0]),
+            method=method.name,
+            rmse=float(rmse[0]),
+            max_error=float(largest[0]),
         )
-        if max_error <= tolerance:
-            runs[method.name] = convert
-            conversions[method.name] = replace(
-                candidate,
-                parameter=float(result[0]),
-                method=method.name,
-                rmse=rmse,
-                max_error=max_error,
-            )
-    samples = interleave(runs, _CONVERSION_ROUNDS, lambda steps: None)
-    times = {name: np.median(seconds) for name, seconds in samples.items()}
-    quick = [name for name, time in times.items() if time <= _SAME_COST * min(times.values())]
-    return conversions[min(quick, key=lambda name: conversions[name].max_error)]
+        if trial.max_error <= tolerance:
+            trials[trial] = convert
+    samples = interleave(trials, _CONVERSION_ROUNDS, lambda steps: None)
+    times = {trial: float(np.median(seconds)) for trial, seconds in samples.items()}
+    quick = [trial for trial, time in times.items() if time <= _SAME_COST * min(times.values())]
+    return min(quick, key=lambda trial: trial.max_error)
 
 
 def _reason(
-    chosen: Mapping[str, Candidate],
-    candidates: Sequence[Candidate],
-    source: str,
-    tolerance: float,
+    chosen: Mapping[str, Candidate], candidates: Sequence[Candidate], source: str, tolerance: float
 ) -> str:
     within = _within(candidates, tolerance)
     if len(within) == 1:
@@ -306,20 +295,15 @@ def _reason(
             NUMPY: f"{candidate.ns / own.ns:.2g} of its time{_tie(candidate, within)}",
         }
         cost = ", ".join(costs[use] for use in uses)
-        what = (
-            f"keep {source}"
-            if candidate.method == NOT_CONVERTED
-            else f"{candidate.distribution} by {candidate.method} "
-            f"(maximum error {candidate.max_error:.2g}, {cost})"
-        )
+        what = f"keep {source}"
+        if candidate.method != NOT_CONVERTED:
+            what = f"{candidate.distribution} by {candidate.method} "
+            what += f"(maximum error {candidate.max_error:.2g}, {cost})"
         parts.append(f"{' and '.join(_COSTS[use] for use in uses)}: {what}")
     return f"{'; '.join(parts)}. {len(within)} stay within {tolerance:g} of {source}."
 
 
 def _tie(candidate: Candidate, within: Sequence[Candidate]) -> str:
-    rivals = [
-        rival.distribution
-        for rival in _quickest(within)
-        if rival.distribution != candidate.distribution
-    ]
+    names = [rival.distribution for rival in _quickest(within)]
+    rivals = [name for name in names if name != candidate.distribution]
     return f"; {' and '.join(rivals)} as quick, but for noise" if rivals else ""

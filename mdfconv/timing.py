@@ -11,13 +11,14 @@ import os
 import random
 import time
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
 
 Advance = Callable[[int], None]
+Key = TypeVar("Key")
 
 # Medians that differ by a smaller share are the same on a machine that is not idle.
 NOISE = 0.1
@@ -44,14 +45,14 @@ def spread(samples: Array) -> Spread:
 
 
 def interleave(
-    functions: Mapping[str, Callable[[], object]], rounds: int, advance: Advance
-) -> dict[str, Array]:
+    functions: Mapping[Key, Callable[[], object]], rounds: int, advance: Advance
+) -> dict[Key, Array]:
     """Time functions in turns, and return the seconds of each by its name.
 
     `rounds` are counted after one that is not; the same place in two arrays is the same round.
     `advance` is called with 1 after each round, the first one included.
     """
-    times: dict[str, list[float]] = {name: [] for name in functions}
+    times = {name: np.empty(rounds + 1) for name in functions}
     order = list(functions)
     shuffle = random.Random(0).shuffle
     for count in range(rounds + 1):
@@ -59,8 +60,6 @@ def interleave(
         for name in order:
             start = clock()
             functions[name]()
-            elapsed = clock() - start
-            if count:
-                times[name].append(elapsed)
+            times[name][count] = clock() - start
         advance(1)
-    return {name: np.array(samples) for name, samples in times.items()}
+    return {name: seconds[1:] for name, seconds in times.items()}

@@ -29,7 +29,6 @@ ABOUT_PARTICULAR_ONES = {
     "studies/furnace.py": "the definitions of BRDFs",
     "brdf/reflection.py": "the definitions of BRDFs",
     "brdf/microfacet.py": "the sampler of Heitz 2018, which is that of an ellipsoid",
-    "studies/furnace_page.py": "the names of BRDFs",
     "studies/lights_page.py": "the pair that was rendered, and laws of particular pairs",
     "cli/furnace_command.py": "the names of BRDFs",
     "cli/compare_command.py": "the names of BRDFs",

@@ -96,7 +96,7 @@ def command(
     elif compare:
         from mdfconv.studies.table2 import printed_cells
 
-        rows = [vars(cell) for cell in printed_cells()]
+        rows = list(printed_cells())
         agreeing = sum(row["agrees"] for row in rows)
         title = f"Table 2 of Sawicki 2021: {agreeing} of {len(rows)} cells within 4e-4"
         minor = ["units"]

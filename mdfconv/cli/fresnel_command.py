@@ -42,8 +42,7 @@ def command(
 
     mdfconv fresnel --format json
     """
-    from mdfconv.studies.fresnel import fit
-    from mdfconv.studies.fresnel_page import COLUMNS, draw_fresnel, error_rows
+    from mdfconv.studies.fresnel import COLUMNS, draw_fresnel, error_rows, fit
 
     outputs = Outputs(png, table=output, force=force)
     fitted = fit(ior, mu, sigma)

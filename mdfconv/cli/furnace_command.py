@@ -111,7 +111,7 @@ def command(
     label = f"{brdf} {parameter:g}"
     picture = {}
     if png:
-        from mdfconv.studies.furnace_page import draw_albedo
+        from mdfconv.studies.furnace import draw_albedo
 
         curve = {label: [row["albedo"] for row in rows]}
         picture[png] = draw_albedo([row["cos_theta"] for row in rows], {"": curve})

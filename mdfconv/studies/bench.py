@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -32,6 +32,7 @@ from mdfconv.timing import Advance, Spread, interleave, spread
 PRECISIONS = ("float64", "float32")
 # Beside the methods: a loop of scipy.optimize.curve_fit.
 LOOP = "curve_fit"
+Row = dict[str, Any]
 # What is written in Dr.Jit.
 _COMPILED = "ggx"
 # The paper's sweep is one of this distribution's m_B.
@@ -100,140 +101,27 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Substitute:
-    """One distribution in the place of a reference.
-
-    Parameters
-    ----------
-    reference : str
-        Name of the reference.
-    reference_parameter : float
-        Its parameter.
-    distribution : str
-        Name of the distribution in its place.
-    operations : int
-        `Distribution.operations`: arithmetic from cos β, a transcendental function counting 10.
-    parameter : float
-        The best fit under the unit metric; NaN where there is none.
-    rmse, max_error : float
-        The error of the unit form that fit leaves, as in `remaining_error`.
-    energy_error : float
-        √(∫ (D − D_ref)² cos β dω / ∫ D_ref² cos β dω), for the best fit under the energy metric.
-    ns_float64, ns_float32 : Spread
-        Nanoseconds of an evaluation of the unit form from β.
-    """
-
-    reference: str
-    reference_parameter: float
-    distribution: str
-    operations: int
-    parameter: float
-    rmse: float
-    max_error: float
-    energy_error: float
-    ns_float64: Spread
-    ns_float32: Spread
-
-
-@dataclass(frozen=True)
-class MethodSpeed:
-    """One method on a sweep of one pair.
-
-    Parameters
-    ----------
-    source, target : str
-        Names of the distributions.
-    method : str
-        Name of the method, or ``"curve_fit"``.
-    metric : str
-        Under which its errors are taken: what it keeps, or unit if it has no choice.
-    values : int
-        Size of the array that was converted at a time.
-    per_second : Spread
-        Values converted a second.
-    parameter_error, parameter_error_max : float
-        Median and maximum over the sweep of |p/p_fit − 1|, p_fit the result of ``"fit"``.
-    rmse, rmse_max : float
-        Median and maximum over the sweep of the error that the conversion leaves under the
-        metric: the relative root mean square of `remaining_error`.
-    answered : float
-        Share of the sweep for which there is a result in the legal range.
-    """
-
-    source: str
-    target: str
-    method: str
-    metric: str
-    values: int
-    per_second: Spread
-    parameter_error: float
-    parameter_error_max: float
-    rmse: float
-    rmse_max: float
-    answered: float
-
-    @property
-    def nanoseconds(self) -> Spread:
-        """The time of a value."""
-        median, low, high = (1e9 / value for value in self.per_second)
-        return Spread(median, high, low)
-
-
-@dataclass(frozen=True)
-class KernelSpeed:
-    """One distribution's unit form in one precision; times in nanoseconds an evaluation.
-
-    Parameters
-    ----------
-    distribution, precision : str
-        Name, and ``"float64"`` or ``"float32"``.
-    parameter : float
-        The parameter.
-    kernel_ns, textbook_ns : Spread
-        `Distribution.unit`, and the printed expression in NumPy.
-    speedup : float
-        Textbook/kernel: the median of the ratios within a round.
-    drjit_ns : Spread, optional
-        The form as Dr.Jit's LLVM backend compiles it, in one thread; of GGX, where Dr.Jit is
-        installed.
-    """
-
-    distribution: str
-    precision: str
-    parameter: float
-    kernel_ns: Spread
-    textbook_ns: Spread
-    speedup: float
-    drjit_ns: Spread | None
-
-
-@dataclass(frozen=True)
 class Measurements:
-    """Speed against error on one machine: its description, and the rows of three tables."""
+    """Speed against error on one machine: its description, and three tables.
+
+    Times in the rows are `Spread` objects. What the columns hold stands with the functions that
+    measure them: `substitutes`, `method_speeds` and `kernel_speeds`.
+    """
 
     machine: str
     sizes: Sizes
-    substitutes: Sequence[Substitute]
-    methods: Sequence[MethodSpeed]
-    kernels: Sequence[KernelSpeed]
+    tables: Mapping[str, Sequence[Row]]
 
-    def records(self) -> dict[str, list[dict[str, Any]]]:
+    def records(self) -> dict[str, list[Row]]:
         """Return the tables by their names, as flat rows in full precision."""
-        return {
-            name: [_record(row) for row in getattr(self, name)]
-            for name in ("substitutes", "methods", "kernels")
-        }
+        return {name: [_record(row) for row in rows] for name, rows in self.tables.items()}
 
 
-def _record(row: Substitute | MethodSpeed | KernelSpeed) -> dict[str, Any]:
-    """Return a row with a spread in three columns, and without what was not measured."""
-    record: dict[str, Any] = {}
-    for field, value in vars(row).items():
-        name = {"source": "from", "target": "to"}.get(field, field)
-        if isinstance(value, Spread):
-            record |= value.columns(name)
-        elif value is not None:
-            record[name] = value
+def _record(row: Row) -> Row:
+    """Return a row with a spread in three columns."""
+    record: Row = {}
+    for name, value in row.items():
+        record |= value.columns(name) if isinstance(value, Spread) else {name: value}
     return record
 
 
@@ -248,16 +136,13 @@ def measure(task: Task, advance: Advance) -> Measurements:
         If there is nothing to convert from source to target.
     """
     # The conversions come first: they may refuse the pair.
-    methods = method_speeds(task.source, task.target, task.sizes, advance)
-    return Measurements(
-        machine=machine(),
-        sizes=task.sizes,
-        methods=methods,
-        substitutes=substitutes(
-            task.reference, task.parameters, task.candidates, task.sizes, advance
-        ),
-        kernels=kernel_speeds(task.candidates, task.sizes, advance),
-    )
+    methods = method_speeds(task, advance)
+    tables = {
+        "substitutes": substitutes(task, advance),
+        "methods": methods,
+        "kernels": kernel_speeds(task, advance),
+    }
+    return Measurements(machine(), task.sizes, tables)
 
 
 def machine() -> str:
@@ -274,77 +159,69 @@ def machine() -> str:
     )
 
 
-def substitutes(
-    reference: Distribution,
-    parameters: Array,
-    candidates: Sequence[Distribution],
-    sizes: Sizes,
-    advance: Advance,
-) -> list[Substitute]:
-    """Measure every candidate in the place of a reference, for each of its parameters."""
-    unit, energy = metric_named("unit"), metric_named("energy")
-    shapes = [best(reference, parameters, candidate, unit) for candidate in candidates]
-    lights = [best(reference, parameters, candidate, energy) for candidate in candidates]
+def substitutes(task: Task, advance: Advance) -> list[Row]:
+    """Measure every candidate in the place of the reference, for each of its parameters.
+
+    Parameter, RMSE and maximum error are those of the best fit under the unit metric, as in
+    `remaining_error`, NaN where there is none; `energy_error` is the RMSE of that under the energy
+    metric. Times are nanoseconds of an evaluation of the unit form from β.
+    """
+    shapes, lights = (
+        np.array([best(task.reference, task.parameters, one, metric) for one in task.candidates])
+        for metric in map(metric_named, ("unit", "energy"))
+    )
     rows = []
-    for number, reference_parameter in enumerate(parameters.tolist()):
-        fits = [[float(column[number]) for column in columns] for columns in shapes]
+    for number, reference_parameter in enumerate(task.parameters.tolist()):
+        fits = shapes[:, :, number].tolist()
         # Where there is no best fit a typical lobe is timed.
         lobes = [
             (candidate, candidate.parameter.typical_value if np.isnan(fit[0]) else fit[0])
-            for candidate, fit in zip(candidates, fits, strict=True)
+            for candidate, fit in zip(task.candidates, fits, strict=True)
         ]
-        float64, float32 = (
-            evaluation_times(lobes, precision, sizes.angles, sizes.rounds, advance)
-            for precision in PRECISIONS
-        )
-        rows += [
-            Substitute(
-                reference=reference.name,
-                reference_parameter=reference_parameter,
-                distribution=candidate.name,
-                operations=candidate.operations,
-                parameter=fits[place][0],
-                rmse=fits[place][1],
-                max_error=fits[place][2],
-                energy_error=float(lights[place][1][number]),
-                ns_float64=float64[place],
-                ns_float32=float32[place],
-            )
-            for place, candidate in enumerate(candidates)
-        ]
+        how = task.sizes.angles, task.sizes.rounds, advance
+        times = {
+            f"ns_{precision}": evaluation_times(lobes, precision, *how) for precision in PRECISIONS
+        }
+        for place, candidate in enumerate(task.candidates):
+            row = {
+                "reference": task.reference.name,
+                "reference_parameter": reference_parameter,
+                "distribution": candidate.name,
+                "operations": candidate.operations,
+                **dict(zip(("parameter", "rmse", "max_error"), fits[place], strict=True)),
+                "energy_error": float(lights[place, 1, number]),
+            }
+            rows.append(row | {name: spreads[place] for name, spreads in times.items()})
     return rows
 
 
-def kernel_speeds(
-    candidates: Sequence[Distribution], sizes: Sizes, advance: Advance
-) -> list[KernelSpeed]:
-    """Measure the unit forms of distributions in both precisions."""
-    speeds = []
+def kernel_speeds(task: Task, advance: Advance) -> list[Row]:
+    """Measure the unit forms of the candidates in both precisions, and the printed expressions.
+
+    Times are nanoseconds of an evaluation; `speedup` is textbook/kernel, the median of the ratios
+    within a round. GGX has ``drjit_ns``, too, where Dr.Jit is installed: the form as its LLVM
+    backend compiles it, in one thread.
+    """
+    rows = []
     for precision in PRECISIONS:
-        beta = np.linspace(0, np.pi / 2, sizes.angles, dtype=precision)
-        for candidate in candidates:
+        beta = np.linspace(0, np.pi / 2, task.sizes.angles, dtype=precision)
+        for candidate in task.candidates:
             parameter = candidate.parameter.typical_value
             rounded = beta.dtype.type(parameter)
             functions: dict[str, Callable[[], object]] = {
-                "kernel": partial(candidate.unit, beta, parameter),
-                "textbook": partial(printed_form, candidate, "unit", beta, rounded),
+                "kernel_ns": partial(candidate.unit, beta, parameter),
+                "textbook_ns": partial(printed_form, candidate, "unit", beta, rounded),
             }
             if candidate.name == _COMPILED and _drjit():
-                functions["drjit"] = compiled_ggx(beta, parameter)
-            samples = interleave(functions, sizes.rounds, advance)
+                functions["drjit_ns"] = compiled_ggx(beta, parameter)
+            samples = interleave(functions, task.sizes.rounds, advance)
+            row = {"distribution": candidate.name, "precision": precision, "parameter": parameter}
             times = {name: spread(1e9 * each / beta.size) for name, each in samples.items()}
-            speeds.append(
-                KernelSpeed(
-                    candidate.name,
-                    precision,
-                    parameter,
-                    times["kernel"],
-                    times["textbook"],
-                    float(np.median(samples["textbook"] / samples["kernel"])),
-                    times.get("drjit"),
-                )
-            )
-    return speeds
+            speedup = float(np.median(samples["textbook_ns"] / samples["kernel_ns"]))
+            compiled = times.pop("drjit_ns", None)
+            row |= {**times, "speedup": speedup}
+            rows.append(row | {"drjit_ns": compiled} if compiled else row)
+    return rows
 
 
 def compiled_ggx(beta: Array, alpha: float) -> Callable[[], Any]:
@@ -389,92 +266,58 @@ def sweep(source: Distribution, count: int) -> Array:
     return np.geomspace(low, high, count)
 
 
-@dataclass(frozen=True)
-class _Trial:
-    """A way to convert a pair, and the metric under which its errors are taken."""
+def method_speeds(task: Task, advance: Advance) -> list[Row]:
+    """Measure every method that covers the pair, under every metric it can answer.
 
-    method: str
-    metric: Metric
-    convert: Callable[[Array], Array]
-
-
-def method_speeds(
-    source: Distribution, target: Distribution, sizes: Sizes, advance: Advance
-) -> list[MethodSpeed]:
-    """Measure every method that covers a pair, under every metric it can answer.
+    A method that follows no metric is measured once, under the first one. `values` are converted
+    at a time, `per_second` is how many a second. The errors are the median and the maximum, over
+    the share of the sweep that is `answered` within the legal range: of |p/p_fit − 1|, p_fit the
+    result of ``"fit"``, and of the RMSE of `remaining_error`.
 
     Raises
     ------
     MdfconvError
         If there is nothing to convert between the two.
     """
+    source, target, sizes = task.source, task.target, task.sizes
     if source.is_same(target):
         raise MdfconvError(f"from {source.name} to {target.name} there is nothing to convert")
-    trials = _trials(source, target)
-    # Among more values most fits come from a curve: here each is found by itself.
-    counts = {LOOP: sizes.loop, "fit": sizes.fits}
-    values = [counts.get(trial.method, sizes.conversions) for trial in trials]
-    functions = {
-        str(number): partial(trial.convert, sweep(source, count))
-        for number, (trial, count) in enumerate(zip(trials, values, strict=True))
-    }
-    times = interleave(functions, sizes.rounds, advance)
-    return [
-        _method_speed(source, target, trial, count, sizes, seconds)
-        for trial, count, seconds in zip(trials, values, times.values(), strict=True)
-    ]
-
-
-def _trials(source: Distribution, target: Distribution) -> list[_Trial]:
-    """Return every way to convert a pair: what follows no metric once, under the first one."""
     metrics = [metric_named(name) for name in list_metrics()]
-    methods = [
-        _Trial(
-            method.name,
-            metric,
-            partial(answers, method, source=source, target=target, metric=metric),
-        )
+    methods: list[tuple[str, Metric, Callable[..., Array]]] = [
+        (method.name, metric, partial(answers, method))
         for metric in metrics
         for method in covering(source, target, metric)
         if method.follows_metric or metric is metrics[0]
     ]
-    return methods + [
-        _Trial(LOOP, metric, partial(curve_fit_loop, source=source, target=target, metric=metric))
-        for metric in metrics
-    ]
-
-
-def _method_speed(
-    source: Distribution,
-    target: Distribution,
-    trial: _Trial,
-    values: int,
-    sizes: Sizes,
-    seconds: Array,
-) -> MethodSpeed:
-    parameter = sweep(source, min(values, sizes.fits))
-    result = trial.convert(parameter)
-    fitted = answers(method_named("fit"), parameter, source, target, trial.metric)
-    answered = ~np.isnan(result) & ~np.isnan(fitted)
-    off = np.abs(result[answered] / fitted[answered] - 1)
-    rmse, _ = remaining_error(source, parameter[answered], target, result[answered], trial.metric)
-    return MethodSpeed(
-        source=source.name,
-        target=target.name,
-        method=trial.method,
-        metric=str(trial.metric),
-        values=values,
-        per_second=spread(values / seconds),
-        parameter_error=_summary(np.median, off),
-        parameter_error_max=_summary(np.max, off),
-        rmse=_summary(np.median, rmse),
-        rmse_max=_summary(np.max, rmse),
-        answered=float(np.mean(answered)),
+    methods += [(LOOP, metric, curve_fit_loop) for metric in metrics]
+    # Among more values most fits come from a curve: here each is found by itself.
+    counts = {LOOP: sizes.loop, "fit": sizes.fits}
+    values = [counts.get(name, sizes.conversions) for name, _, _ in methods]
+    times = interleave(
+        {
+            (name, metric): partial(convert, sweep(source, count), source, target, metric)
+            for (name, metric, convert), count in zip(methods, values, strict=True)
+        },
+        sizes.rounds,
+        advance,
     )
-
-
-def _summary(function: Callable[[Array], Any], values: Array) -> float:
-    return float(function(values)) if values.size else float("nan")
+    rows = []
+    for (name, metric, convert), count in zip(methods, values, strict=True):
+        parameter = sweep(source, min(count, sizes.fits))
+        result = convert(parameter, source, target, metric)
+        fitted = answers(method_named("fit"), parameter, source, target, metric)
+        answered = ~np.isnan(result) & ~np.isnan(fitted)
+        parameter, result = parameter[answered], result[answered]
+        off = np.abs(result / fitted[answered] - 1)
+        rmse, _ = remaining_error(source, parameter, target, result, metric)
+        if not answered.any():
+            off = rmse = np.array([np.nan])
+        row: Row = {"from": source.name, "to": target.name, "method": name, "metric": str(metric)}
+        row |= {"values": count, "per_second": spread(count / times[name, metric])}
+        for column, errors in (("parameter_error", off), ("rmse", rmse)):
+            row |= {column: float(np.median(errors)), f"{column}_max": float(np.max(errors))}
+        rows.append(row | {"answered": float(np.mean(answered))})
+    return rows
 
 
 def curve_fit_loop(

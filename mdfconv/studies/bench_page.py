@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from itertools import cycle
-from typing import Any
+from itertools import cycle, groupby
+from operator import itemgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mdfconv.output.figures import encoded, line_style, new_figure
 from mdfconv.output.records import markdown_text
-from mdfconv.studies.bench import LOOP, Measurements, Substitute
+from mdfconv.studies.bench import LOOP, PRECISIONS, Measurements, Row
 from mdfconv.studies.pages import fill
 from mdfconv.timing import NOISE, Spread
 
@@ -22,82 +22,90 @@ TITLES = {
 }
 
 
-def tables(measurements: Measurements) -> dict[str, list[dict[str, Any]]]:
+def tables(measurements: Measurements) -> dict[str, list[Row]]:
     """Return the tables by name, in rounded cells, a median with its quartiles in one."""
-    return {
-        "substitutes": [
-            {
-                "reference": f"{row.reference} {row.reference_parameter:g}",
-                "distribution": row.distribution,
-                "parameter": _rounded(row.parameter, 5),
-                "operations": row.operations,
-                "float32 ns": _times(row.ns_float32),
-                "float64 ns": _times(row.ns_float64),
-                "RMSE": _rounded(row.rmse),
-                "max error": _rounded(row.max_error),
-                "energy error": _rounded(row.energy_error),
-                "unbeaten": unbeaten,
-            }
-            for rows in _by_reference(measurements)
-            for row, unbeaten in zip(rows, _unbeaten(rows), strict=True)
-        ],
-        "methods": [
-            {
-                "method": row.method,
-                "metric": row.metric,
-                "values": row.values,
-                "ns a value": _times(row.nanoseconds),
-                "values per second": f"{_rounded(row.per_second.median):,.0f}",
-                "parameter error": _rounded(row.parameter_error),
-                "largest": _rounded(row.parameter_error_max),
-                "RMSE": _rounded(row.rmse),
-                "largest RMSE": _rounded(row.rmse_max),
-                "answered": f"{100 * row.answered:.3g} %",
-            }
-            for row in measurements.methods
-        ],
-        "kernels": [
-            {
-                "distribution": row.distribution,
-                "type": row.precision,
-                "kernel ns": _times(row.kernel_ns),
-                "textbook ns": _times(row.textbook_ns),
-                "textbook / kernel": _rounded(row.speedup),
-                "Dr.Jit ns": _times(row.drjit_ns) if row.drjit_ns else "",
-            }
-            for row in measurements.kernels
-        ],
-    }
+    measured = measurements.tables
+    by_reference = itemgetter("reference", "reference_parameter")
+    substitutes = [
+        {
+            "reference": f"{row['reference']} {row['reference_parameter']:g}",
+            "distribution": row["distribution"],
+            "parameter": _rounded(row["parameter"], 5),
+            "operations": row["operations"],
+            "float32 ns": _times(row["ns_float32"]),
+            "float64 ns": _times(row["ns_float64"]),
+            "RMSE": _rounded(row["rmse"]),
+            "max error": _rounded(row["max_error"]),
+            "energy error": _rounded(row["energy_error"]),
+            "unbeaten": unbeaten,
+        }
+        for _, group in groupby(measured["substitutes"], by_reference)
+        for row, unbeaten in _judged(list(group))
+    ]
+    methods = [
+        {
+            "method": row["method"],
+            "metric": row["metric"],
+            "values": row["values"],
+            "ns a value": _times(_nanoseconds(row)),
+            "values per second": f"{_rounded(row['per_second'].median):,.0f}",
+            "parameter error": _rounded(row["parameter_error"]),
+            "largest": _rounded(row["parameter_error_max"]),
+            "RMSE": _rounded(row["rmse"]),
+            "largest RMSE": _rounded(row["rmse_max"]),
+            "answered": f"{100 * row['answered']:.3g} %",
+        }
+        for row in measured["methods"]
+    ]
+    kernels = [
+        {
+            "distribution": row["distribution"],
+            "type": row["precision"],
+            "kernel ns": _times(row["kernel_ns"]),
+            "textbook ns": _times(row["textbook_ns"]),
+            "textbook / kernel": _rounded(row["speedup"]),
+            "Dr.Jit ns": _times(row["drjit_ns"]) if "drjit_ns" in row else "",
+        }
+        for row in measured["kernels"]
+    ]
+    return {"substitutes": substitutes, "methods": methods, "kernels": kernels}
 
 
 def title(measurements: Measurements, name: str) -> str:
     """Return the heading of a table."""
-    pair = measurements.methods[0]
-    return TITLES[name] + (f", {pair.source} → {pair.target}" if name == "methods" else "")
+    return TITLES[name] + (f", {_pair(measurements)}" if name == "methods" else "")
+
+
+def _pair(measurements: Measurements) -> str:
+    return "{from} → {to}".format_map(measurements.tables["methods"][0])
 
 
 def markdown_page(measurements: Measurements, picture: str | None = None) -> str:
     """Return the measurements as a Markdown page, which shows a picture if one is named."""
-    loops = {row.metric: row for row in measurements.methods if row.method == LOOP}
+    methods = measurements.tables["methods"]
+    speeds = {(row["method"], row["metric"]): row["per_second"].median for row in methods}
     gains = [
-        row.per_second.median / loops[row.metric].per_second.median
-        for row in measurements.methods
-        if row.method == "fit"
+        speed / speeds[LOOP, metric]
+        for (method, metric), speed in speeds.items()
+        if method == "fit"
     ]
-    formulas = [row for row in measurements.methods if row.method not in ("fit", LOOP)]
-    quickest = max(formulas, key=lambda row: row.per_second.median)
+    formulas = [row for row in methods if row["method"] not in ("fit", LOOP)]
+    quickest = max(formulas, key=lambda row: row["per_second"].median)
     shares = {
-        precision: [1 / row.speedup for row in measurements.kernels if row.precision == precision]
-        for precision in ("float32", "float64")
+        precision: [
+            1 / row["speedup"]
+            for row in measurements.tables["kernels"]
+            if row["precision"] == precision
+        ]
+        for precision in PRECISIONS
     }
-    pair = measurements.methods[0]
     return fill(
         "speed-error",
         least_gain=min(gains),
         most_gain=max(gains),
-        loop_error=max(row.parameter_error_max for row in loops.values()),
-        quickest=vars(quickest),
-        per_second=_rounded(quickest.per_second.median, 2),
+        loop_error=max(row["parameter_error_max"] for row in methods if row["method"] == LOOP),
+        quickest=quickest,
+        per_second=_rounded(quickest["per_second"].median, 2),
         least_share={name: min(values) for name, values in shares.items()},
         most_share={name: max(values) for name, values in shares.items()},
         machine=measurements.machine,
@@ -105,23 +113,15 @@ def markdown_page(measurements: Measurements, picture: str | None = None) -> str
         picture=f"![Error against time, distributions and methods]({picture})\n\n"
         if picture
         else "",
-        pair=f"{pair.source} → {pair.target}",
+        pair=_pair(measurements),
         **{name: markdown_text(list(rows[0]), rows) for name, rows in tables(measurements).items()},
     )
 
 
-def _by_reference(measurements: Measurements) -> list[list[Substitute]]:
-    """Return the substitutes of each reference and parameter."""
-    groups: dict[tuple[str, float], list[Substitute]] = {}
-    for row in measurements.substitutes:
-        groups.setdefault((row.reference, row.reference_parameter), []).append(row)
-    return list(groups.values())
-
-
-def _unbeaten(rows: Sequence[Substitute]) -> list[bool]:
-    """Return which substitutes none is both quicker than, beyond noise, and nearer."""
-    unbeaten = front([(row.ns_float32.median, row.rmse) for row in rows], NOISE)
-    return [number in unbeaten for number in range(len(rows))]
+def _judged(rows: Sequence[Row]) -> list[tuple[Row, bool]]:
+    """Return substitutes with whether none is both quicker, beyond noise, and nearer."""
+    unbeaten = front([(row["ns_float32"].median, row["rmse"]) for row in rows], NOISE)
+    return [(row, number in unbeaten) for number, row in enumerate(rows)]
 
 
 def front(points: Sequence[tuple[float, float]], tie: float = 0.0) -> list[int]:
@@ -159,6 +159,12 @@ def _times(times: Spread) -> str:
     return f"{median} ({low}–{high})"
 
 
+def _nanoseconds(row: Row) -> Spread:
+    """Return the time of a value, from the values a second."""
+    median, low, high = (1e9 / value for value in row["per_second"])
+    return Spread(median, high, low)
+
+
 _SIZE = (11.0, 6.5)  # inches
 _MARKERS = "osD^vPX*<>hp"
 # Tell apart variants of one name: parameters of the reference, metrics of a method.
@@ -168,8 +174,7 @@ _COLORS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#5
 _ROUNDING = 1e-12  # smaller errors are none
 
 
-@dataclass(frozen=True)
-class _Point:
+class _Point(NamedTuple):
     name: str
     variant: str
     nanoseconds: Spread
@@ -182,19 +187,22 @@ def draw(measurements: Measurements, dpi: int = 120) -> bytes:
     Low and left is better. What has no error to show is left out.
     """
     figure = new_figure(*_SIZE)
+    # Not before `new_figure` has prepared Matplotlib.
+    from matplotlib.ticker import LogLocator
+
     left, right = figure.subplots(1, 2)
     substitutes = [
         _Point(
-            row.distribution,
-            f"for {row.reference} {row.reference_parameter:.4g}",
-            row.ns_float32,
-            row.rmse,
+            row["distribution"],
+            f"for {row['reference']} {row['reference_parameter']:.4g}",
+            row["ns_float32"],
+            row["rmse"],
         )
-        for row in measurements.substitutes
+        for row in measurements.tables["substitutes"]
     ]
     methods = [
-        _Point(row.method, f"metric {row.metric}", row.nanoseconds, row.parameter_error)
-        for row in measurements.methods
+        _Point(row["method"], f"metric {row['metric']}", _nanoseconds(row), row["parameter_error"])
+        for row in measurements.tables["methods"]
     ]
     names = dict.fromkeys(point.name for point in methods)
     _draw_panel(left, substitutes, {p.name: line_style(p.name)["color"] for p in substitutes})
@@ -204,23 +212,16 @@ def draw(measurements: Measurements, dpi: int = 120) -> bytes:
         xlabel="time of an evaluation, float32 [ns]",
         ylabel="RMSE of the best fit, unit form",
     )
-    _label_few_decades(left.xaxis)
+    # So few powers of ten that one cannot read between them.
+    left.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    left.xaxis.set_major_formatter("{x:g}")
+    left.xaxis.set_minor_formatter("")
     right.set(
         title=title(measurements, "methods"),
         xlabel="time of a conversion [ns]",
         ylabel="median relative error of the parameter against fit",
     )
     return encoded(figure, dpi=dpi)
-
-
-def _label_few_decades(axis: Any) -> None:
-    """Label an axis that has too few powers of ten to be read between them."""
-    # Not before `new_figure` has prepared Matplotlib.
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(NullFormatter())
 
 
 def _draw_panel(axes: Any, points: Iterable[_Point], colors: dict[str, str]) -> None:

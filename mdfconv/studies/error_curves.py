@@ -117,8 +117,7 @@ def draw_errors(
         _line(lower, drawn, name, 100 * error, name)
     figure.suptitle(title)
     if log:
-        upper.set_yscale("log")
-        upper.set_ylim(_FLOOR, 2)
+        upper.set(yscale="log", ylim=(_FLOOR, 2))
     upper.set_ylabel(f"(a) {drawn.quantity}")
     upper.legend(fontsize=8)
     lower.axhline(0, color="0.4", linewidth=0.8)

@@ -7,28 +7,23 @@ shrink towards its peak (the mirror image, or the half vector along the normal).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 
-from mdfconv.brdf import reflection
+from mdfconv.brdf import microfacet, reflection
 from mdfconv.brdf.fresnel import Fresnel, lossless
-from mdfconv.brdf.microfacet import (
-    MASKINGS,
-    Brdf,
-    Microsurface,
-    direction,
-    dot,
-    frames,
-    mirrored,
-    reflect,
-)
+from mdfconv.brdf.microfacet import Brdf, Microsurface, direction, dot, reflect
 from mdfconv.distributions import distribution
 from mdfconv.distributions.evaluation import Array, gauss_legendre, gauss_panels
 from mdfconv.errors import MdfconvError
+from mdfconv.output.figures import PAGE, encoded, new_figure
+from mdfconv.output.records import csv_text, markdown_text
 from mdfconv.registry import Registry
+from mdfconv.studies.pages import PageFiles, fill, pivot
 
 
 def cosine_lobe(axis: Array, exponent: float, u1: Array, u2: Array) -> Array:
@@ -39,7 +34,7 @@ def cosine_lobe(axis: Array, exponent: float, u1: Array, u2: Array) -> Array:
     # 1 − cos θ = −expm1(ln(1−u)/(γ+1)) keeps the digits of narrow lobes.
     drop = -np.expm1(np.log1p(-u1) / (exponent + 1))
     local = direction(2 * np.arcsin(np.sqrt(0.5 * drop)), 2 * np.pi * u2)
-    drawn: Array = np.einsum("...i,...ij->...j", local, frames(axis))
+    drawn: Array = np.einsum("...i,...ij->...j", local, microfacet.frames(axis))
     return drawn
 
 
@@ -141,17 +136,15 @@ def sampled_albedo(
     There is one of each for every cosine of the viewer; `seed` is that of the random numbers.
     """
     random = np.random.default_rng(seed)
-    results = [_estimate(model, float(value), random.random((2, count))) for value in cosine]
-    albedo, error = np.array(results).reshape(-1, 2).T
+    estimates = []
+    for value in np.maximum(cosine, _LEAST_COSINE).tolist():
+        view = np.broadcast_to(_viewer(value), (count, 3))
+        light, density = model.sample(view, *random.random((2, count)))
+        reflected = model.brdf(light, view) * light[..., 2]
+        weight = np.where(density > 0, reflected / np.where(density > 0, density, 1), 0)
+        estimates.append((weight.mean(), weight.std(ddof=1) / np.sqrt(count)))
+    albedo, error = np.array(estimates).reshape(-1, 2).T
     return albedo, error
-
-
-def _estimate(model: FurnaceModel, cosine: float, numbers: Array) -> tuple[float, float]:
-    view = np.broadcast_to(_viewer(max(cosine, _LEAST_COSINE)), (*numbers[0].shape, 3))
-    light, density = model.sample(view, *numbers)
-    value = model.brdf(light, view) * light[..., 2]
-    weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
-    return float(weight.mean()), float(weight.std(ddof=1) / np.sqrt(weight.size))
 
 
 def _viewer(cosine: float) -> Array:
@@ -266,8 +259,8 @@ class _Definition:
 
     name: str
     build: Callable[..., FurnaceModel]
-    option: str = ""
-    distribution: str = ""
+    option: str
+    distribution: str
 
 
 _REGISTRY: Registry[_Definition] = Registry("BRDF")
@@ -318,22 +311,15 @@ def list_models() -> list[str]:
     return _REGISTRY.names
 
 
-def _of_facets(name: str, owner: str, brdf: Callable[..., Brdf], option: str = "") -> _Definition:
-    """Return the definition of a BRDF of half vectors, by the distribution of its facets."""
-
-    def build(parameter: float, **options: str) -> FurnaceModel:
-        surface = Microsurface(distribution(owner), parameter)
-        return _facet_model(brdf(surface, lossless, **options), surface)
-
-    return _Definition(name, build, option, owner)
-
-
 def _masked(surface: Microsurface, fresnel: Fresnel, masking: str = "correlated") -> Brdf:
-    return reflection.microfacet(surface, fresnel, MASKINGS[masking](surface))
+    return reflection.microfacet(surface, fresnel, microfacet.MASKINGS[masking](surface))
 
 
-def _facet_model(brdf: Brdf, surface: Microsurface) -> FurnaceModel:
+def _facet_model(
+    owner: str, brdf: Callable[..., Brdf], parameter: float, **options: str
+) -> FurnaceModel:
     """Return the model of a BRDF in half vectors, sampled by the facets of its surface."""
+    surface = Microsurface(distribution(owner), parameter)
 
     def sample(view: Array, u1: Array, u2: Array) -> tuple[Array, Array]:
         if surface.has_visible_normals:
@@ -346,31 +332,24 @@ def _facet_model(brdf: Brdf, surface: Microsurface) -> FurnaceModel:
         return reflect(view, m), reflected_density(density, view, m)
 
     width = float(surface.distribution.peak_alpha(surface.parameter))
-    return FurnaceModel(brdf, width, False, sample)
+    return FurnaceModel(brdf(surface, lossless, **options), width, False, sample)
 
 
-def _original_phong(exponent: float) -> FurnaceModel:
-    return _mirror_model(reflection.original(exponent), exponent)
-
-
-def _modified_phong(exponent: float, normalizer: str = "usual") -> FurnaceModel:
-    return _mirror_model(reflection.modified(exponent, normalizer), exponent)
-
-
-def _mirror_model(brdf: Brdf, exponent: float) -> FurnaceModel:
+def _mirror_model(brdf: Callable[..., Brdf], exponent: float, **options: str) -> FurnaceModel:
     """Return the model of a BRDF around the mirror image of the viewer."""
 
     def sample(view: Array, u1: Array, u2: Array) -> tuple[Array, Array]:
-        axis = mirrored(view)
+        axis = microfacet.mirrored(view)
         light = cosine_lobe(axis, exponent, u1, u2)
         return light, cosine_lobe_density(axis, exponent, light)
 
-    return FurnaceModel(brdf, 1 / np.sqrt(exponent + 1), True, sample)
+    return FurnaceModel(brdf(exponent, **options), 1 / np.sqrt(exponent + 1), True, sample)
 
 
-def _register(definition: _Definition) -> None:
-    """Register a BRDF, under all names of its distribution if it has that of one."""
-    name, owner = definition.name, definition.distribution
+def _register(name: str, brdf: Callable[..., Brdf], owner: str = "", option: str = "") -> None:
+    """Register a BRDF by the owner of its facets, and under all names of that if it has its."""
+    build = partial(_facet_model, owner, brdf) if owner else partial(_mirror_model, brdf)
+    definition = _Definition(name, build, option, owner)
     if owner == name:
         mdf = distribution(name)
         _REGISTRY.add(name, definition, mdf.aliases, mdf.meant_by)
@@ -379,13 +358,113 @@ def _register(definition: _Definition) -> None:
         _REGISTRY.add(name, definition, meant_by=dict.fromkeys(meant, "phong"))
 
 
-for _definition in (
-    _of_facets("ggx", "ggx", _masked, "masking"),
-    _of_facets("beckmann", "beckmann", _masked, "masking"),
-    _Definition("phong", _original_phong),
-    _Definition("modified-phong", _modified_phong, "normalizer"),
-    _of_facets("smoothie", "smoothie", reflection.smoothie),
-    _of_facets("smoothie-approx", "smoothie", reflection.smoothie_approx),
-    _of_facets("ashikhmin-shirley", "ashikhmin-shirley", reflection.ashikhmin_shirley),
-):
-    _register(_definition)
+_register("ggx", _masked, "ggx", "masking")
+_register("beckmann", _masked, "beckmann", "masking")
+_register("phong", reflection.original)
+_register("modified-phong", reflection.modified, option="normalizer")
+_register("smoothie", reflection.smoothie, "smoothie")
+_register("smoothie-approx", reflection.smoothie_approx, "smoothie")
+_register("ashikhmin-shirley", reflection.ashikhmin_shirley, "ashikhmin-shirley")
+
+
+_COSINES = np.linspace(0, 1, 21)
+# The rows of the cosines that the page shows: 0, 0.1, 0.5 and 1.
+_SHOWN = {"grazing": 0, "nearly_grazing": 2, "oblique": 10, "normal": 20}
+_GAMMA, _ALPHA = 20.0, 0.5
+_EXACT = ("Phong: modified, Arvo", "Phong: modified, Mallett & Yuksel")
+_Model = tuple[str, float, dict[str, str]]
+_Models = dict[str, _Model]
+
+
+def _modified(normalizer: str) -> _Model:
+    return "modified-phong", _GAMMA, {"normalizer": normalizer}
+
+
+def _smooth_and_rough(*names: str) -> _Models:
+    return {f"{name} {alpha:g}": (name, alpha, {}) for name in names for alpha in (0.1, 1.0)}
+
+
+# Panels of the figure by name: the title, and for each curve a label and its model.
+_PANELS: dict[str, tuple[str, _Models]] = {
+    "Phong": (
+        f"Phong, γ = {_GAMMA:g}",
+        {
+            "original": ("phong", _GAMMA, {}),
+            "modified, usual": _modified("usual"),
+            "modified, Arvo": _modified("arvo"),
+            "modified, Mallett & Yuksel": _modified("mallett-yuksel"),
+        },
+    ),
+    "GGX": (
+        f"GGX, α = {_ALPHA:g}, by masking",
+        {name: ("ggx", _ALPHA, {"masking": name}) for name in microfacet.MASKINGS.names},
+    ),
+    "GGX and Beckmann": ("GGX and Beckmann, correlated", _smooth_and_rough("ggx", "beckmann")),
+    "Smoothie": ("Smoothie", _smooth_and_rough("smoothie", "smoothie-approx")),
+}
+_RESPONSE_ALPHAS = (0.01, 0.1, 0.25, 0.5, 1.0)
+
+
+def furnace() -> PageFiles:
+    """Return the white furnace of the BRDFs."""
+    albedos = {
+        panel: {
+            label: directional_albedo(furnace_model(name, parameter, **options), _COSINES).tolist()
+            for label, (name, parameter, options) in models.items()
+        }
+        for panel, (_, models) in _PANELS.items()
+    }
+    columns = {
+        f"{panel}: {label}": values
+        for panel, curves in albedos.items()
+        for label, values in curves.items()
+    }
+    shown = [
+        (name, f"cos θ = {_COSINES[row]:g}", f"{values[row]:.4g}")
+        for name, values in columns.items()
+        for row in _SHOWN.values()
+    ]
+    responses = [
+        {"α": alpha, "integral": energy_response(alpha), "printed": printed_energy_response(alpha)}
+        for alpha in _RESPONSE_ALPHAS
+    ]
+    page = fill(
+        "furnace",
+        largest=max(map(max, albedos["Smoothie"].values())),
+        albedos=pivot("BRDF", shown),
+        responses=markdown_text(list(responses[0]), responses),
+        **{
+            angle: {name: values[row] for name, values in columns.items()}
+            for angle, row in _SHOWN.items()
+        },
+    )
+    rows = [
+        {"cos_theta": float(cosine)}
+        | {name: float(f"{values[row]:.8g}") for name, values in columns.items()}
+        for row, cosine in enumerate(_COSINES)
+    ]
+    error = max(abs(albedo - 1) for name in _EXACT for albedo in columns[name])
+    titled = {title: albedos[panel] for panel, (title, _) in _PANELS.items()}
+    picture = draw_albedo(_COSINES.tolist(), titled)
+    return PageFiles([page, csv_text(list(rows[0]), rows), picture], {"error": error})
+
+
+def draw_albedo(
+    cosine: Sequence[float], panels: Mapping[str, Mapping[str, Sequence[float]]]
+) -> bytes:
+    """Return a figure of albedos over the viewer's cosine: by panel and label."""
+    rows = (len(panels) + 1) // 2
+    columns = min(2, len(panels))
+    width = PAGE[0] * (1.45 if columns > 1 else 1)
+    figure = new_figure(width, PAGE[1] * 0.72 * rows + 0.6)
+    axes = figure.subplots(rows, columns, squeeze=False)
+    dashes = ["-", (0, (5, 2)), (0, (5, 2, 1, 2)), (0, (1, 1.5)), (0, (8, 2)), (0, (3, 3))]
+    for axis, (title, curves) in zip(axes.flat, panels.items(), strict=True):
+        for number, (label, albedo) in enumerate(curves.items()):
+            style = {"color": f"C{number}", "linestyle": dashes[number % len(dashes)]}
+            axis.plot(cosine, albedo, label=label, linewidth=1.5, **style)
+        highest = max(max(albedo) for albedo in curves.values())
+        axis.set(xlabel="cos θ of the viewer", ylabel="directional albedo", title=title)
+        axis.set(xlim=(0, 1), ylim=(0, min(max(1.05, 1.05 * highest), 1.6)))
+        axis.legend(loc="best")
+    return encoded(figure, dpi=110)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -13,22 +14,17 @@ from mdfconv.fitting.metrics import metric_named
 from mdfconv.formula import SearchProblem, cheapest
 from mdfconv.output.figures import PAGE, encoded, new_figure
 from mdfconv.output.records import csv_text, markdown_text, rounded_rows
-from mdfconv.scene.shininess import (
-    EXPONENTS,
-    IMPORTERS,
-    ROUGHNESS,
-    SHININESS,
-    encoding_records,
-    error_of,
-    importer_roughness,
-    roughness_of,
-)
+from mdfconv.scene import shininess
+from mdfconv.scene.shininess import EXPONENTS, IMPORTERS, roughness_of
 from mdfconv.studies.pages import PageFiles, fill, pivot
 
 _EXPONENTS = np.geomspace(1, 1e4, 81)
 # Of the roughness that is asked for.
 _ABOUT_RIGHT = 0.1
 _MIRROR = 1e-9
+_ROUGHNESS_COLUMNS, _RMSE_COLUMNS = (
+    [f"{what}_{n}" for n in EXPONENTS] for what in ("roughness", "rmse")
+)
 _LIGHT = "environment"
 _OURS = (_LIGHT, "energy", "display")
 # Above the rules, in black and grey.
@@ -45,15 +41,12 @@ def importers() -> PageFiles:
     curves, rules = _curves(), _rules()
     low, high = float(_EXPONENTS[0]), float(_EXPONENTS[-1])
     light = metric_named(_LIGHT)
-    formula = cheapest(SearchProblem(*endpoints(SHININESS, ROUGHNESS), light, low, high), 0.01)
-    at_100 = {rule["importer"]: rule["roughness_100"] for rule in rules}
+    formula = cheapest(
+        SearchProblem(*endpoints(shininess.SHININESS, shininess.ROUGHNESS), light, low, high), 0.01
+    )
+    at_100 = [rule["roughness_100"] for rule in rules]
     right = float(roughness_of(np.array([100.0]), light)[0])
-    figures = {
-        "rules": len(rules),
-        "lowest": min(at_100.values()),
-        "highest": max(at_100.values()),
-        "right": right,
-    }
+    figures = {"rules": len(rules), "lowest": min(at_100), "highest": max(at_100), "right": right}
     answers = [
         (f"{n:g}", name, f"{roughness_of(np.array([n]), metric_named(name))[0]:.4g}")
         for n in map(float, (1, *EXPONENTS, 10000))
@@ -67,7 +60,7 @@ def importers() -> PageFiles:
         formula_error=formula.error,
         low=low,
         high=high,
-        about_right=sum(abs(value / right - 1) < _ABOUT_RIGHT for value in at_100.values()),
+        about_right=sum(abs(value / right - 1) < _ABOUT_RIGHT for value in at_100),
         tolerance=_ABOUT_RIGHT,
         mirrors=sum(bool((curves[rule] < _MIRROR).any()) for rule in IMPORTERS),
         rule_table=markdown_text(list(rules[0]), rules),
@@ -79,11 +72,11 @@ def importers() -> PageFiles:
 
 def _curves() -> dict[str, Array]:
     """Return Ns, the roughness by each rule and by ours, and the RMSE of each for the light."""
-    roughness = {rule: importer_roughness(rule, _EXPONENTS) for rule in IMPORTERS}
+    roughness = {rule: shininess.importer_roughness(rule, _EXPONENTS) for rule in IMPORTERS}
     roughness |= {name: roughness_of(_EXPONENTS, metric_named(name)) for name in _OURS}
     light = metric_named(_LIGHT)
     errors = {
-        f"RMSE {name}": error_of(_EXPONENTS, roughness[name], light)
+        f"RMSE {name}": shininess.error_of(_EXPONENTS, roughness[name], light)
         for name in (*IMPORTERS, _LIGHT)
     }
     return {"Ns": _EXPONENTS} | roughness | errors
@@ -92,15 +85,13 @@ def _curves() -> dict[str, Array]:
 def _rules() -> list[dict[str, Any]]:
     """Return each rule with the roughness and the error that it leaves."""
     rules = []
-    for record in encoding_records(metric_named(_LIGHT)):
+    for record in shininess.encoding_records(metric_named(_LIGHT)):
         name = record["encoding"].partition(":")[2]
         if name in IMPORTERS:
             row = {"importer": name, "programs": record["programs"], "rule": record["formula"]}
-            for n in EXPONENTS:
-                row[f"roughness_{n}"] = float(f"{record[f'roughness_{n}']:.3g}")
-            for n in EXPONENTS:
-                rmse = record[f"rmse_{n}"]
-                row[f"rmse_{n}"] = f"{rmse:.2g}" if np.isfinite(rmse) else "mirror"
+            row |= {key: float(f"{record[key]:.3g}") for key in _ROUGHNESS_COLUMNS}
+            rmse = {key: record[key] for key in _RMSE_COLUMNS}
+            row |= {key: f"{e:.2g}" if np.isfinite(e) else "mirror" for key, e in rmse.items()}
             rules.append(row)
     return rules
 
@@ -119,10 +110,7 @@ def _draw(curves: dict[str, Array]) -> bytes:
     left, right = figure.subplots(1, 2)
     colors = colormaps["tab10"](range(10)).tolist()
     labels = _labels(curves)
-    styles = {
-        name: (colors[number % len(colors)], _DASHES[number % len(_DASHES)])
-        for number, name in enumerate(labels)
-    }
+    styles = dict(zip(labels, zip(cycle(colors), cycle(_DASHES), strict=False), strict=False))
     for name, (color, dashes) in (styles | _OUR_STYLES).items():
         label = labels.get(name, f"mdfconv, {name}")
         width = 2.0 if name == _LIGHT else 1.1
@@ -133,12 +121,7 @@ def _draw(curves: dict[str, Array]) -> bytes:
             finite = np.isfinite(errors)
             right.plot(curves["Ns"][finite], errors[finite], **style)
     left.set(xscale="log", xlabel="Ns", ylabel="roughness", title="What becomes of an exponent")
-    right.set(
-        xscale="log",
-        yscale="log",
-        xlabel="Ns",
-        ylabel="relative RMSE under environment",
-        title="Error, up to where a rule makes a mirror",
-    )
+    right.set(xscale="log", yscale="log", xlabel="Ns", ylabel="relative RMSE under environment")
+    right.set_title("Error, up to where a rule makes a mirror")
     figure.legend(loc="outside lower center", ncols=5)
     return encoded(figure, dpi=110)

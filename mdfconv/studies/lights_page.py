@@ -33,14 +33,16 @@ At p = 0 that is the energy metric and at p = 2 the environment metric.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from itertools import permutations
 from typing import Any
 
 import numpy as np
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from scipy.special import k0, k1
+from scipy.stats import spearmanr
 
 from mdfconv.distributions import Distribution, distribution, one_parameter_distributions
 from mdfconv.distributions.evaluation import Array
@@ -49,7 +51,7 @@ from mdfconv.fitting.solve import fit
 from mdfconv.output.figures import PAGE, encoded, new_figure
 from mdfconv.output.records import csv_text, rounded_rows
 from mdfconv.studies.bench import as_wide
-from mdfconv.studies.pages import PageFiles, fill, pivot
+from mdfconv.studies.pages import PageFiles, fill, pivot, read_rows
 
 LINEAR, FLIP = "linear RMSE", "HDR-FLIP"
 _COLUMNS = {LINEAR: "linear_rmse", "sRGB RMSE": "srgb_rmse", FLIP: "hdr_flip"}
@@ -87,8 +89,10 @@ _METRIC_STYLES = {
 }
 _MARKERS = ("o", "s", "^")
 _MARK: dict[str, Any] = {"linestyle": "", "markersize": 5}
-_LINEAR_STYLE = _MARK | {"color": "#56B4E9", "markeredgecolor": "#000000", "markeredgewidth": 0.6}
-_FLIP_STYLE = _MARK | {"color": "none", "markeredgecolor": "#CC79A7", "markeredgewidth": 0.9}
+_STYLES = {
+    LINEAR: _MARK | {"color": "#56B4E9", "markeredgecolor": "#000000", "markeredgewidth": 0.6},
+    FLIP: _MARK | {"color": "none", "markeredgecolor": "#CC79A7", "markeredgewidth": 0.9},
+}
 _DIAGONAL = (0.58, 0.96)
 
 
@@ -109,8 +113,7 @@ class Renders:
 
 def read_renders() -> Renders:
     """Return the rendered cases that come with the package."""
-    text = files("mdfconv.studies").joinpath("data", "renders.csv").read_text(encoding="utf-8")
-    rows = list(csv.DictReader(text.splitlines()))
+    rows = read_rows("renders.csv")
 
     def numbers(column: str) -> Array:
         return np.array([float(row[column]) for row in rows])
@@ -129,22 +132,16 @@ def read_renders() -> Renders:
 
 def best_ratio(exponent: float) -> float:
     """Return the α/m_B of least error under light of angular power l^−p, p from −1 to 4."""
-    from scipy.optimize import brentq
-
     return float(brentq(_slope, *_RATIOS, args=(exponent,), xtol=_TOLERANCE))
 
 
 def equivalent_exponent(ratio: float) -> float:
     """Return the exponent p, from −1 to 4, whose power law has a given α/m_B as its best."""
-    from scipy.optimize import brentq
-
     return float(brentq(lambda exponent: _slope(ratio, exponent), *_EXPONENTS, xtol=_TOLERANCE))
 
 
 def _slope(ratio: float, exponent: float) -> float:
     """Return the slope of the squared error over the ratio, but for a negative factor."""
-    from scipy.integrate import quad
-    from scipy.special import k0, k1
 
     def integrand(degree: float) -> float:
         x = 2 * ratio * degree
@@ -210,10 +207,12 @@ def _width_power(mdf: Distribution) -> float:
 
 def lights() -> PageFiles:
     """Return the evidence for the metrics: theory, rendered spheres, constants."""
-    from scipy.stats import spearmanr
-
     renders, constants = read_renders(), smooth_constants()
     exponents = np.array([equivalent_exponent(ratio) for ratio in renders.predicted])
+    # The α of a Student-t lobe over Beckmann's m_B is the same at every roughness.
+    beckmann, lobe = distribution("beckmann"), distribution("student-t")
+    ratio = metric_named("environment").ratio
+    student = {gamma: ratio(beckmann, lobe.with_gamma(gamma)) for gamma in (3, 5, 20)}
     smooth = np.array([SMOOTH])
     metrics = {name: _fitted("ggx", smooth, name)[0] / SMOOTH for name in _METRIC_STYLES}
     off = renders.predicted / renders.best[LINEAR] - 1
@@ -234,7 +233,7 @@ def lights() -> PageFiles:
         },
         exponent={"least": exponents.min(), "largest": exponents.max()},
         constants=_constant_table(constants),
-        student={gamma: _student_ratio(gamma) for gamma in (3, 5, 20)},
+        student=student,
         rough=ROUGH,
         deviation=[min(deviations), max(deviations)],
         shifted=np.abs(_fitted("blinn-phong", _M_B, "environment") / (2 / _M_B**2 - 1) - 1).max(),
@@ -255,12 +254,6 @@ def _fitted(target: str, m_b: Array, metric: str) -> Array:
     return fit(distribution("beckmann"), m_b, distribution(target), metric_named(metric)).parameter
 
 
-def _student_ratio(gamma: float) -> float | None:
-    """Return the α of a Student-t lobe over Beckmann's m_B, at every roughness."""
-    target = distribution("student-t").with_gamma(gamma)
-    return metric_named("environment").ratio(distribution("beckmann"), target)
-
-
 def cost_table(renders: Renders) -> str:
     """Return the mean and the worst costs of the rules by measure and m_B, as Markdown."""
     groups = {
@@ -273,8 +266,8 @@ def cost_table(renders: Renders) -> str:
     for label, cost in groups.items():
         means = np.exp(np.mean(np.log(cost), axis=0))  # geometric: costs are ratios
         for (ratio, rule), mean, worst in zip(RULES.items(), means, cost.max(axis=0), strict=True):
-            text = f"**{mean:.2f}**" if mean == means.min() else f"{mean:.2f}"
-            cells.append((label, f"{ratio} {rule}", f"{text} ({worst:.2f})"))
+            mark = "**" if mean == means.min() else ""
+            cells.append((label, f"{ratio} {rule}", f"{mark}{mean:.2f}{mark} ({worst:.2f})"))
     return pivot("mean over lights (worst)", cells)
 
 
@@ -297,30 +290,27 @@ def _constant_table(constants: Sequence[SmoothConstant]) -> str:
     return pivot("distribution", cells)
 
 
-def draw_lights(
-    renders: Renders, exponents: Array, metrics: Mapping[str, float], dpi: int = 110
-) -> bytes:
+def draw_lights(renders: Renders, exponents: Array, metrics: Mapping[str, float]) -> bytes:
     """Return a PNG: best ratios over the exponent of the light, and predicted against rendered."""
     figure = new_figure(PAGE[0] * 1.5, PAGE[1] * 0.95)
     left, right = figure.subplots(1, 2)
     curve = [best_ratio(exponent) for exponent in _DRAWN_EXPONENTS]
-    handles = left.plot(
-        _DRAWN_EXPONENTS, curve, color="#000000", label="pure power law, smooth surface"
-    )
+    theory = {"color": "#000000", "label": "pure power law, smooth surface"}
+    handles = left.plot(_DRAWN_EXPONENTS, curve, **theory)
     for name, ratio in metrics.items():
         color, dashes = _METRIC_STYLES[name]
         left.axhline(ratio, color=color, linestyle=dashes, linewidth=1.3)
     names = [f"{name}\n{ratio:.3f}" for name, ratio in metrics.items()]
     left.secondary_yaxis("right").set_yticks(list(metrics.values()), names)
     handles += right.plot(_DIAGONAL, _DIAGONAL, color="#999999", label="rendered as predicted")
-    linear, flip = renders.best[LINEAR], renders.best[FLIP]
     for m_b, marker in zip(np.unique(renders.m_b), _MARKERS, strict=True):
         case = renders.m_b == m_b
-        styles = [style | {"marker": marker} for style in (_LINEAR_STYLE, _FLIP_STYLE)]
-        for (name, best), style in zip(((LINEAR, linear), (FLIP, flip)), styles, strict=True):
+        for name, style in _STYLES.items():
+            best, marked = renders.best[name][case], style | {"marker": marker}
             label = f"least {name}, m_B = {m_b:g}"
-            handles += left.plot(exponents[case], best[case], label=label, **style)
-        right.plot(renders.predicted[case], linear[case], **styles[0])
+            handles += left.plot(exponents[case], best, label=label, **marked)
+            if name == LINEAR:
+                right.plot(renders.predicted[case], best, **marked)
     left.set(
         xlabel="exponent p of the power law that has the predicted ratio",
         ylabel="best α / m_B",
@@ -335,4 +325,4 @@ def draw_lights(
         aspect="equal",
     )
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
-    return encoded(figure, dpi=dpi)
+    return encoded(figure, dpi=110)

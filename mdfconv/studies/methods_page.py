@@ -37,29 +37,28 @@ def methods() -> PageFiles:
     """Return the methods beside the best fit: the figures for the choice of a default."""
     compared = [one for one in one_parameter_distributions() if one.map_variables is not None]
     pairs = [pair for pair in permutations(compared, 2) if exact_route(*pair) is None]
-    formulas = sorted(
-        (method for method in list_methods() if not method.follows_metric),
-        key=lambda method: method.name,
-    )
+    names = sorted(method.name for method in list_methods() if not method.follows_metric)
+    formulas = [method_named(name) for name in names]
     metrics = [metric_named(name) for name in list_metrics()]
     errors = _compare(pairs, formulas, metrics)
-    names = product(_RANGES, (metric.name for metric in metrics), (one.name for one in formulas))
-    rows = [_row(key, errors[key]) for key in names if key in errors]
+    keys = product(_RANGES, (metric.name for metric in metrics), names)
+    rows = [_row(key, errors[key]) for key in keys if key in errors]
     sweep, rougher = ([row for row in rows if row["range"] == name] for name in _RANGES)
     unanswered = [1 - row["answered"] for row in rougher]
-    medians: dict[str, dict[str, float]] = {}
-    for row in sweep:
-        medians.setdefault(row["method"], {})[row["metric"]] = row["median"]
+    closed_form = {row["metric"]: row["median"] for row in sweep if row["method"] == "closed-form"}
     page = fill(
         "methods",
         count=len(compared),
-        closed_form=medians["closed-form"],
-        best={metric: min(each[metric] for each in medians.values()) for metric in list_metrics()},
+        closed_form=closed_form,
+        best={
+            name: min(row["median"] for row in sweep if row["metric"] == name)
+            for name in closed_form
+        },
         sweep=_table(sweep),
         rougher=_table(rougher),
         unanswered=f"{min(unanswered):.1%} to {max(unanswered):.1%}",
     )
-    return PageFiles([page, csv_text(list(rows[0]), rows)], medians["closed-form"])
+    return PageFiles([page, csv_text(list(rows[0]), rows)], closed_form)
 
 
 def _compare(

@@ -6,6 +6,7 @@ figure ``error``, with Python's rules of format; a table is the figure ``{table}
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from string import Formatter
@@ -36,6 +37,12 @@ def fill(name: str, **figures: object) -> str:
         missing, spare = sorted(used - figures.keys()), sorted(figures.keys() - used)
         raise ValueError(f"pages/{name}.md: figures missing {missing}, without use {spare}")
     return template.rstrip("\n").format_map(figures)
+
+
+def read_rows(name: str) -> list[dict[str, str]]:
+    """Return the rows of a file of ``data/``, from which studies and their pages are made."""
+    text = files("mdfconv.studies").joinpath("data", name).read_text(encoding="utf-8")
+    return list(csv.DictReader(text.splitlines()))
 
 
 def pivot(corner: str, cells: Iterable[tuple[str, str, str]]) -> str:

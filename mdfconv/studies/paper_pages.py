@@ -40,7 +40,7 @@ _FIGURE_DPI, _PICTURE_SIZE = 110, 192
 def table2() -> PageFiles:
     """Return Table 2 and the printed cells that do not come back."""
     rows = fit_table(*paper_sweep(), metric_named(_UNIT))
-    cells = [vars(cell) for cell in printed_cells(rows)]
+    cells = list(printed_cells(rows))
     missed = [cell for cell in cells if not cell["agrees"]]
     columns = [name for name in cells[0] if name != "agrees"]
     figures = {

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 from mdfconv.fitting.metrics import list_metrics
 from mdfconv.output.files import file_bytes
 from mdfconv.studies import paper_pages
-from mdfconv.studies.fresnel_page import fresnel
-from mdfconv.studies.furnace_page import furnace
+from mdfconv.studies.fresnel import fresnel
+from mdfconv.studies.furnace import furnace
 from mdfconv.studies.importers_page import importers
 from mdfconv.studies.lights_page import lights
 from mdfconv.studies.methods_page import methods
 from mdfconv.studies.pages import PageFiles, fill
-from mdfconv.studies.stability_page import stability
+from mdfconv.studies.stability import stability
 
 
 @dataclass(frozen=True)

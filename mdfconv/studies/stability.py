@@ -7,13 +7,13 @@ in decimal arithmetic, so that neither the references nor the comparison add an 
 
 from __future__ import annotations
 
-import csv
+import math
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from decimal import Decimal
-from importlib.resources import files
 from itertools import groupby
+from operator import attrgetter
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -25,6 +25,8 @@ from mdfconv.distributions.endpoint import Endpoint, exact_route
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvWarning
 from mdfconv.fitting.metrics import metric_named
+from mdfconv.output.records import csv_text
+from mdfconv.studies.pages import PageFiles, fill, pivot, read_rows
 
 # Of the kernels. Conversions compute in float64 throughout: float32 rounds input and result.
 _KERNEL_TYPES = (np.float64, np.float32, np.float16)
@@ -82,12 +84,12 @@ class Finding:
     rule: str
     regime: str
     dtype: str
-    cases: int
-    out_of_range: int
-    error: float | str
-    error_in_eps: float | str
-    textbook: float | str
-    worst: str
+    cases: int = 0
+    out_of_range: int = 0
+    error: float | str = ""
+    error_in_eps: float | str = ""
+    textbook: float | str = ""
+    worst: str = ""
     round_trip: bool = False
 
     def record(self) -> dict[str, Any]:
@@ -120,25 +122,26 @@ def findings(audited: str, cases: Iterable[HardCases]) -> Iterator[Finding]:
     for each in cases:
         groups.setdefault((each.rule, each.regime, each.values.dtype), []).append(each)
     for (rule, regime, dtype), members in groups.items():
-        errors = [e for each in members for e in relative_errors(each.values, each.exact)]
-        textbook = [
+        errors = np.concatenate([relative_errors(one.values, one.exact) for one in members])
+        printed = [
             error
-            for each in members
-            if each.textbook is not None
-            for error in relative_errors(each.textbook, each.exact)
+            for one in members
+            if one.textbook is not None
+            for error in relative_errors(one.textbook, one.exact)
         ]
-        index = int(np.argmax(np.nan_to_num(errors, nan=np.inf)))
+        worst = int(np.argmax(np.nan_to_num(errors, nan=np.inf)))
+        textbook = float(np.max(printed)) if printed else None
         yield Finding(
             audited,
             rule,
             regime,
             dtype.name,
-            cases=len(errors),
-            out_of_range=sum(not _in_range(e, dtype) for each in members for e in each.exact),
-            error=two_digits(errors[index]),
-            error_in_eps=two_digits(errors[index] / float(np.finfo(dtype).eps)),
-            textbook=_worst_of_textbook(textbook),
-            worst=[case for each in members for case in each.cases][index],
+            cases=errors.size,
+            out_of_range=sum(not _in_range(e, dtype) for one in members for e in one.exact),
+            error=two_digits(errors[worst]),
+            error_in_eps=two_digits(errors[worst] / float(np.finfo(dtype).eps)),
+            textbook="" if textbook is None else _number_or_word(textbook),
+            worst=[case for one in members for case in one.cases][worst],
             round_trip=members[0].round_trip,
         )
 
@@ -169,22 +172,13 @@ def _in_range(exact: Decimal, dtype: np.dtype) -> bool:
     return float(limits.smallest_normal) <= exact <= float(limits.max)
 
 
-def _worst_of_textbook(errors: list[float]) -> float | str:
-    if not errors:
-        return ""
-    worst = float(np.max(errors))
-    return two_digits(worst) if np.isfinite(worst) else str(worst).replace("nan", "NaN")
+def _number_or_word(error: float) -> float | str:
+    return two_digits(error) if np.isfinite(error) else str(error).replace("nan", "NaN")
 
 
 def two_digits(value: float) -> float:
     """Return a value rounded to two significant digits: an error's size is what matters."""
     return float(f"{value:.1e}")
-
-
-def read_rows(name: str) -> list[dict[str, str]]:
-    """Return the rows of a file of reference values."""
-    text = files("mdfconv.studies").joinpath("data", name).read_text(encoding="utf-8")
-    return list(csv.DictReader(text.splitlines()))
 
 
 def audit_kernels(chosen: Sequence[Distribution]) -> Iterator[Finding]:
@@ -193,20 +187,16 @@ def audit_kernels(chosen: Sequence[Distribution]) -> Iterator[Finding]:
     β is compared as stored: of a β beyond π/2, which float32's π/2 is, the mirrored angle counts.
     The normalized forms are compared at β = 0; elsewhere they are a multiple of the unit forms.
     """
-    stored = {dtype: _by_distribution(np.dtype(dtype).name) for dtype in _KERNEL_TYPES}
+    stored = {dtype: read_rows(f"kernels-{dtype.__name__}.csv") for dtype in _KERNEL_TYPES}
     for audited in chosen:
-        for dtype, rows_of in stored.items():
-            rows = rows_of.get(audited.name) or rows_of.get(_same_function(audited), [])
-            if rows:
+        for dtype, references in stored.items():
+            names = {row["distribution"] for row in references}
+            name = audited.name if audited.name in names else _same_function(audited)
+            if name in names:
+                rows = [row for row in references if row["distribution"] == name]
                 yield from findings(audited.name, _kernel_cases(audited, rows, dtype))
             else:
-                group = (audited.name, "unit", "no stored references", np.dtype(dtype).name)
-                yield Finding(*group, 0, 0, error="", error_in_eps="", textbook="", worst="")
-
-
-def _by_distribution(dtype: str) -> dict[str, _Rows]:
-    rows = read_rows(f"kernels-{dtype}.csv")
-    return {name: list(group) for name, group in groupby(rows, lambda row: row["distribution"])}
+                yield Finding(audited.name, "unit", "no stored references", dtype.__name__)
 
 
 def _same_function(audited: Distribution) -> str:
@@ -280,14 +270,15 @@ def audit_conversions(chosen: Sequence[Distribution]) -> Iterator[Finding]:
     for source in chosen:
         fitted = [row for row in fits if row["source"] == source.name]
         for method in list_methods():
-            forward, back = [], []
             names = (method.name, source.name)
             rows = [row for row in formulas if (row["method"], row["source"]) == names]
-            for batch in _formula_batches(source, rows):
-                for dtype in _CONVERSION_TYPES:
-                    forward += [_conversion(method, batch, dtype)]
-                    back += _round_trip(method, batch, forward[-1])
-            yield from findings(source.name, [*forward, *back])
+            cases = [
+                case
+                for batch in _formula_batches(source, rows)
+                for dtype in _CONVERSION_TYPES
+                for case in _forth_and_back(method, batch, dtype)
+            ]
+            yield from findings(source.name, sorted(cases, key=attrgetter("round_trip")))
             if method.follows_metric:
                 yield from findings(source.name, _fits(method, source, fitted))
         yield from findings(source.name, _encodings(source))
@@ -319,36 +310,25 @@ def _converted(values: Array, source: Distribution, target: Distribution, method
         return convert(values, Endpoint(source), Endpoint(target), method.name)
 
 
-def _conversion(method: Method, batch: _Batch, dtype: Any) -> HardCases:
-    values = batch.of_type(dtype)
-    return HardCases(
-        method.name,
-        batch.regime,
-        _converted(values, batch.source, batch.target, method),
-        printed_conversion(method, batch.source, batch.target, values),
-        batch.exact,
-        batch.cases,
-    )
-
-
-def _round_trip(method: Method, batch: _Batch, forward: HardCases) -> list[HardCases]:
-    """Return the way back from a conversion, if the method has one that undoes it."""
-    source, target = batch.source, batch.target
+def _forth_and_back(method: Method, batch: _Batch, dtype: Any) -> Iterator[HardCases]:
+    """Yield a conversion, and the way back from it if the method has one that undoes it."""
+    source, target, values = batch.source, batch.target, batch.of_type(dtype)
+    converted = _converted(values, source, target, method)
+    textbook = printed_conversion(method, source, target, values)
+    yield HardCases(method.name, batch.regime, converted, textbook, batch.exact, batch.cases)
     if method.name not in _INVERTIBLE and exact_route(source, target) is None:
-        return []
-    textbook = forward.textbook
+        return
     if textbook is not None:
         textbook = printed_conversion(method, target, source, textbook)
-    back = HardCases(
+    yield HardCases(
         f"{method.name} and back",
         batch.regime,
-        _converted(forward.values, target, source, method),
+        _converted(converted, target, source, method),
         textbook,
-        [Decimal(float(value)) for value in batch.of_type(forward.values.dtype)],
+        [Decimal(float(value)) for value in values],
         [f"{case} → {source.name}" for case in batch.cases],
         round_trip=True,
     )
-    return [back]
 
 
 def printed_conversion(
@@ -432,3 +412,70 @@ def audit(names: Sequence[str] = (), part: str | None = None) -> Iterator[Findin
     for name, audit_part in _PARTS.items():
         if part in (None, name):
             yield from audit_part(chosen)
+
+
+# Digits and the places of the worst cases differ from one processor to the next.
+_PAGE_COLUMNS = [name for name in COLUMNS if name not in ("error_in_eps", "worst")]
+_KERNELS = ("unit", "normalized")
+_NO_DIGIT, _FAILS = "1", "fails"
+_NO_REFERENCES = "—"
+
+
+def stability() -> PageFiles:
+    """Return the audit of hard cases.
+
+    Errors are orders of magnitude, rounded up: their digits differ from one processor to the
+    next.
+    """
+    rows = [
+        finding.record()
+        | {name: _magnitude(getattr(finding, name)) for name in ("error", "textbook")}
+        for finding in audit()
+    ]
+    kernels = [row for row in rows if row["rule"] in _KERNELS]
+    by_type = {
+        dtype: _table([row for row in kernels if row["dtype"] == dtype], "distribution", "regime")
+        for dtype in ("float64", "float32")
+    }
+    conversions = [row for row in rows if row["rule"] not in _KERNELS]
+    figures = {
+        "cases": sum(row["cases"] for row in rows),
+        "distributions": len({row["distribution"] for row in rows}),
+        "groups": len(rows),
+        "failures": sum(row["error"] == _FAILS for row in rows),
+        "textbook_failures": sum(row["textbook"] == _FAILS for row in rows),
+    }
+    page = fill("stability", **by_type, conversions=_table(conversions, "rule", "dtype"), **figures)
+    shown = [{name: row[name] for name in _PAGE_COLUMNS} for row in rows]
+    return PageFiles([page, csv_text(_PAGE_COLUMNS, shown)], figures)
+
+
+def _table(rows: Sequence[dict[str, Any]], row: str, column: str) -> str:
+    """Return the worst errors, ours and the textbook's, by two columns."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for each in rows:
+        groups.setdefault((each[row], each[column]), []).append(each)
+    return pivot(row, ((*key, _worst(group)) for key, group in groups.items()))
+
+
+def _worst(group: Sequence[dict[str, Any]]) -> str:
+    if not any(row["cases"] for row in group):
+        return _NO_REFERENCES
+    texts = ([row[name] for row in group] for name in ("error", "textbook"))
+    return " / ".join(max(each, key=_order) for each in texts if any(each))
+
+
+def _order(magnitude: str) -> float:
+    return math.inf if magnitude == _FAILS else float(magnitude or 0)
+
+
+def _magnitude(error: float | str) -> str:
+    """Return an error's order of magnitude, rounded up; at most 1."""
+    if error == "":
+        return ""
+    if isinstance(error, str) or not math.isfinite(error):
+        return _FAILS
+    if error == 0:
+        return "0"
+    power = math.ceil(math.log10(error))
+    return _NO_DIGIT if power >= 0 else f"1e{power:03d}"

@@ -9,10 +9,8 @@ The paper's closed forms are fits to this table, redone here under every metric.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -21,12 +19,13 @@ from mdfconv.conversion.explanation import remaining_error
 from mdfconv.distributions import distribution, one_parameter_distributions
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.free_gamma import fit_free_gamma
+from mdfconv.fitting.free_gamma import FreeFit, fit_free_gamma
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.metrics.base import Unit
 from mdfconv.fitting.problem import FitProblem
 from mdfconv.fitting.quadrature import UniformSamples
 from mdfconv.fitting.solve import fit
+from mdfconv.studies.pages import read_rows
 
 # Between 0 and the limit of a row.
 SAMPLES = 3001
@@ -45,25 +44,9 @@ COLUMNS = (
 Row = dict[str, float]
 
 
-@dataclass(frozen=True)
-class Cell:
-    """A printed cell beside ours.
-
-    `units` is the difference in units of the last printed digit; a reason has what does not agree.
-    """
-
-    m_b: str
-    column: str
-    printed: str
-    ours: float
-    units: float
-    agrees: bool
-    reason: str
-
-
 def paper_sweep() -> tuple[Array, Array]:
     """Return the paper's m_B, unrounded, and the limit of β of each row, radians."""
-    rows = _read("table2_protocol.csv")
+    rows = read_rows("table2_protocol.csv")
     numbers = [[float(row[key]) for row in rows] for key in ("m_b_exact", "beta_max_rad")]
     return np.array(numbers[0]), np.array(numbers[1])
 
@@ -102,22 +85,26 @@ def fit_table(
     return rows
 
 
-def printed_cells(ours: list[Row] | None = None) -> Iterator[Cell]:
-    """Yield the 153 printed parameters and errors beside ours, fitted anew if not given."""
-    reasons = {(row["m_b"], row["column"]): row["reason"] for row in _read("table2_missed.csv")}
+def printed_cells(ours: list[Row] | None = None) -> Iterator[dict[str, Any]]:
+    """Yield the 153 printed parameters and errors beside ours, fitted anew if not given.
+
+    `units` is the difference in units of the last printed digit; a reason has what does not agree.
+    """
+    reasons = {(row["m_b"], row["column"]): row["reason"] for row in read_rows("table2_missed.csv")}
     ours = fit_table(*paper_sweep(), Unit()) if ours is None else ours
-    for printed, row in zip(_read("table2.csv"), ours, strict=True):
+    for printed, row in zip(read_rows("table2.csv"), ours, strict=True):
         for column in COLUMNS[2:]:
-            value, cell = float(printed[column]), (printed["m_b"], column)
-            agrees = abs(row[column] / value - 1) <= AGREEMENT
-            units = (row[column] - value) / _last_digit(column, printed[column])
-            reason = "" if agrees else reasons.get(cell, "unexplained")
-            yield Cell(*cell, printed[column], row[column], units, agrees, reason)
-
-
-def _read(name: str) -> list[dict[str, str]]:
-    text = files("mdfconv.studies").joinpath("data", name).read_text()
-    return list(csv.DictReader(text.splitlines()))
+            agrees = abs(row[column] / float(printed[column]) - 1) <= AGREEMENT
+            difference = row[column] - float(printed[column])
+            yield {
+                "m_b": printed["m_b"],
+                "column": column,
+                "printed": printed[column],
+                "ours": row[column],
+                "units": difference / _last_digit(column, printed[column]),
+                "agrees": agrees,
+                "reason": "" if agrees else reasons.get((printed["m_b"], column), "unexplained"),
+            }
 
 
 def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dict[str, Array]:
@@ -142,21 +129,18 @@ def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dic
         others = [mdf for mdf in one_parameter_distributions() if mdf not in known]
         targets |= {mdf.name.replace("-", "_"): mdf for mdf in others}
     for column, target in targets.items():
-        gamma = None
-        if target.second_parameter:
-            free = fit_free_gamma(source, m_b, target, metric, samples)
-            best, distance, gamma = free.parameter, free.distance, free.gamma
-            columns |= {column: best, f"gamma_{column}": gamma}
-        else:
-            fixed = fit(source, m_b, target, metric, samples)
-            best, distance = fixed.parameter, fixed.distance
-            columns[column] = best
+        solve = fit_free_gamma if target.second_parameter else fit
+        fitted = solve(source, m_b, target, metric, samples)
+        columns[column] = best = fitted.parameter
+        gamma = fitted.gamma if isinstance(fitted, FreeFit) else None
+        if gamma is not None:
+            columns[f"gamma_{column}"] = gamma
         _check_answers(m_b, best, target.name)
         if samples is None:
             rmse, _ = remaining_error(source, m_b, target, best, metric, gamma)
         else:
             # A degree of freedom is spent for each parameter.
-            rmse = np.sqrt(np.maximum(distance, 0) / (SAMPLES - len(target.parameters)))
+            rmse = np.sqrt(np.maximum(fitted.distance, 0) / (SAMPLES - len(target.parameters)))
         columns[f"rmse_{column}"] = rmse
     return columns
 
@@ -279,15 +263,10 @@ def _coefficients(values: Sequence[float]) -> str:
 def _refit_one(form: Law, metric: Metric, x: Array, y: Array) -> Refit:
     from scipy.optimize import least_squares
 
-    def relative(coefficients: Array) -> Array:
+    def relative(coefficients: Sequence[float]) -> Array:
         return form.shape(x, *coefficients) / y - 1
 
     with np.errstate(invalid="ignore"):
         best = least_squares(relative, form.printed, x_scale="jac", xtol=1e-14, ftol=1e-14).x
-    return Refit(
-        form=form,
-        metric=str(metric),
-        coefficients=tuple(best.tolist()),
-        printed_error=float(np.max(np.abs(relative(np.array(form.printed))))),
-        error=float(np.max(np.abs(relative(best)))),
-    )
+    errors = (float(np.max(np.abs(relative(each)))) for each in (form.printed, best))
+    return Refit(form, str(metric), tuple(best.tolist()), *errors)

@@ -17,8 +17,7 @@ from mdfconv.brdf.fresnel import (
     smoothie_fresnel,
 )
 from mdfconv.errors import MdfconvError
-from mdfconv.studies.fresnel import fit, rescaled
-from mdfconv.studies.fresnel_page import error_rows, fresnel
+from mdfconv.studies.fresnel import error_rows, fit, fresnel, rescaled
 from tests.cli.runner import run
 
 mp.mp.dps = 60

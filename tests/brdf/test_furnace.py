@@ -12,11 +12,11 @@ from mdfconv.brdf.reflection import arvo, mallett_yuksel
 from mdfconv.studies.furnace import (
     directional_albedo,
     energy_response,
+    furnace,
     furnace_model,
     list_models,
     sampled_albedo,
 )
-from mdfconv.studies.furnace_page import furnace
 from tests.cli.runner import run
 
 COSINES = np.array([0.0, 1e-6, 1e-3, 0.03, 0.2, 0.5, 0.77, 0.99, 1.0])

@@ -63,12 +63,13 @@ def measurements(newcomers):
 
 
 def test_benchmark(measurements):
-    assert {"cosine-power", "generalized"} <= {row.distribution for row in measurements.kernels}
-    substitutes = {row.distribution: row for row in measurements.substitutes}
-    assert substitutes["cosine-power"].parameter == pytest.approx(
-        substitutes["blinn-phong"].parameter
+    measured = measurements.tables
+    assert {"cosine-power", "generalized"} <= {row["distribution"] for row in measured["kernels"]}
+    substitutes = {row["distribution"]: row for row in measured["substitutes"]}
+    assert substitutes["cosine-power"]["parameter"] == pytest.approx(
+        substitutes["blinn-phong"]["parameter"]
     )
-    methods = {(row.method, row.metric) for row in measurements.methods}
+    methods = {(row["method"], row["metric"]) for row in measured["methods"]}
     assert ("fit", "projected") in methods
     assert "fast" not in {method for method, _ in methods}
     shown = {row["distribution"] for row in tables(measurements)["substitutes"]}

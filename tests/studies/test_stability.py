@@ -11,15 +11,15 @@ import pytest
 import mdfconv
 from mdfconv.conversion import method_named
 from mdfconv.distributions.endpoint import Endpoint
-from mdfconv.studies import stability_page
+from mdfconv.studies.pages import read_rows
 from mdfconv.studies.stability import (
     HardCases,
     audit,
     findings,
     printed_conversion,
     printed_form,
-    read_rows,
     relative_errors,
+    stability,
 )
 from tests import generate_stability, oracles, stability_fits
 from tests.cli.runner import run
@@ -266,8 +266,8 @@ def test_bad_requests(arguments, words):
 
 
 def test_page():
-    page, table = stability_page.stability().files
-    contents, figures = stability_page.stability()
+    page, table = stability().files
+    contents, figures = stability()
     assert contents == [page, table]
     assert figures["failures"] == 0
     rows = list(csv.DictReader(table.splitlines()))

@@ -11,19 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import (
-    DpiOption,
-    FolderOption,
-    ForceOption,
-    Format,
-    FormatOption,
-    FromOption,
-    MethodOption,
-    asked_endpoint,
-    chosen_metric,
-    refuse_idle_metric,
-)
+from mdfconv.cli import completion, options
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import form_of, write_table
@@ -75,7 +63,7 @@ def command(
             show_default=False,
         ),
     ] = None,
-    source: FromOption = _REFERENCE,
+    source: options.FromOption = _REFERENCE,
     targets: Annotated[
         list[str] | None,
         typer.Option(
@@ -85,7 +73,7 @@ def command(
             help="What takes its place, as for --from; repeatable; the paper's if not given.",
         ),
     ] = None,
-    method: MethodOption = None,
+    method: options.MethodOption = None,
     metric: Annotated[
         str | None,
         typer.Option(
@@ -124,10 +112,10 @@ def command(
             "Pictures, too, only with --output.",
         ),
     ] = None,
-    dpi: DpiOption = 120,
-    output: FolderOption = None,
-    force: ForceOption = False,
-    format_: FormatOption = None,
+    dpi: options.DpiOption = 120,
+    output: options.FolderOption = None,
+    force: options.ForceOption = False,
+    format_: options.FormatOption = None,
 ) -> None:
     """Render a sphere with one distribution put in another's place: Figures 3 to 5.
 
@@ -167,7 +155,7 @@ def command(
 
     outputs = Outputs(html, force=force)
     names = targets or []
-    end = asked_endpoint(source)
+    end = options.asked_endpoint(source)
     ends = _targets(end, names)
     contents: dict[Path, bytes] = {}
     if html is not None:
@@ -177,7 +165,7 @@ def command(
         if output is None:
             outputs.write(contents)
             return
-    refuse_idle_metric(context, method)
+    options.refuse_idle_metric(context, method)
     rules = _rules(method, metric, exposure)
     surfaces = _surfaces(end, values)
     if _asks_for_all(names):
@@ -196,7 +184,7 @@ def command(
         contents[folder / f"{name}.png"] = draw_comparison(comparison, dpi)
     outputs.write(contents)
     form = form_of(format_)
-    if form is Format.table:
+    if form is options.Format.table:
         # People read parameters with their symbols.
         texts = {target.label: target.text for target in ends}
         for row in rows:
@@ -245,7 +233,7 @@ def _targets(source: Endpoint, names: Sequence[str]) -> list[Endpoint]:
     from mdfconv.render.comparison import PAPER_SETS
 
     if names and not _asks_for_all(names):
-        ends = [asked_endpoint(name) for name in names]
+        ends = [options.asked_endpoint(name) for name in names]
         return list({end.label: end for end in ends}.values())
     every = [mdf.name for mdf in one_parameter_distributions()] if names else PAPER_SETS["fig1"]
     return [one_parameter_endpoint(name) for name in every if name != source.distribution.name]
@@ -295,5 +283,5 @@ def _rules(method: str | None, metric: str | None, exposure: float) -> list[Pict
     chosen = metric_named(metric or "unit")
     if chosen.setting == "exposure":
         # A screen's picture is exposed as the scene is.
-        chosen = chosen_metric(chosen.name, exposure)
+        chosen = options.chosen_metric(chosen.name, exposure)
     return [PictureRule(method_named(method or "fit").name, chosen)]

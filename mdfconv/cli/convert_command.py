@@ -12,29 +12,8 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from mdfconv.cli.options import (
-    ExposureOption,
-    Format,
-    FormatOption,
-    FromOption,
-    GammaOption,
-    MethodOption,
-    OptionalMetricOption,
-    SpecularOption,
-    ToOption,
-    asked_metric,
-    chosen_gamma,
-    every_metric,
-)
+from mdfconv.cli import options, tables
 from mdfconv.cli.process import tell
-from mdfconv.cli.tables import (
-    ROWS_SHOWN,
-    console,
-    form_of,
-    print_table,
-    table_text,
-    value_text,
-)
 from mdfconv.conversion import Conversion, explain, list_methods
 from mdfconv.conversion.explanation import explained
 from mdfconv.conversion.values import FREE, ConversionRule, Gamma, Value, holds_pairs
@@ -63,14 +42,14 @@ def command(
             "values from standard input, one a line.",
         ),
     ],
-    source: FromOption,
-    target: ToOption,
-    method: MethodOption = None,
-    metric: OptionalMetricOption = None,
-    exposure: ExposureOption = None,
-    gamma: GammaOption = None,
-    specular: SpecularOption = None,
-    format_: FormatOption = None,
+    source: options.FromOption,
+    target: options.ToOption,
+    method: options.MethodOption = None,
+    metric: options.OptionalMetricOption = None,
+    exposure: options.ExposureOption = None,
+    gamma: options.GammaOption = None,
+    specular: options.SpecularOption = None,
+    format_: options.FormatOption = None,
 ) -> None:
     """Convert parameters from one distribution to another.
 
@@ -97,11 +76,11 @@ def command(
 
     seq 0.1 0.1 0.4 | mdfconv convert --from ggx --to beckmann --method half-angle -
     """
-    form = form_of(format_, in_pipe=Format.plain)
-    asked, fixed_or_free = asked_metric(metric, exposure), chosen_gamma(gamma)
+    form = tables.form_of(format_, in_pipe=options.Format.plain)
+    asked, fixed_or_free = options.asked_metric(metric, exposure), options.chosen_gamma(gamma)
     every, free = target.strip().lower() == ALL, fixed_or_free == FREE
     source, target = with_specular(source, source if every else target, specular)
-    if form is Format.plain and not every and not free:
+    if form is options.Format.plain and not every and not free:
         _stream(read_blocks(values), ConversionRule(source, target, method, asked, fixed_or_free))
         return
     numbers = [number for block in read_blocks(values) for number in block.numbers]
@@ -109,7 +88,7 @@ def command(
     refusals: list[MdfconvError] = []
     for name in _targets(numbers, source) if every else [target]:
         own = fixed_or_free if not every or _takes_gamma(source, name, free=free) else None
-        errors = form is not Format.plain
+        errors = form is not options.Format.plain
         try:
             groups.append(
                 explain(numbers, source, name, method, metric=asked, gamma=own, errors=errors)
@@ -120,15 +99,15 @@ def command(
         raise refusals[0]
     for refusal in refusals:
         tell(f"left out: {refusal}")
-    if form is Format.plain:
+    if form is options.Format.plain:
         _write_plain(groups, named=every, free=free)
-    elif form is Format.table:
+    elif form is options.Format.table:
         for group in groups:
             _print_group(group, fixed_or_free, exposure)
     else:
         records = [_record(conversion) for group in groups for conversion in group]
         columns = [name for name in records[0] if any(r[name] is not None for r in records)]
-        typer.echo(table_text(columns, records, form))
+        typer.echo(tables.table_text(columns, records, form))
 
 
 def _targets(numbers: list[Value], source: str) -> list[str]:
@@ -233,7 +212,7 @@ def _results(numbers: list[Value], rule: ConversionRule) -> tuple[list[str], lis
     if holds_pairs(numbers):
         conversions = explained(numbers, rule, errors=False)
         cautions = [text for conversion in conversions for text in conversion.cautions]
-        return [value_text(conversion.result) for conversion in conversions], cautions
+        return [tables.value_text(conversion.result) for conversion in conversions], cautions
     converted = rule.convert(np.array(numbers, dtype=float))
     return list(map(number_text, converted.stored.tolist())), rule.true_cautions(converted)
 
@@ -273,20 +252,20 @@ def _write_plain(groups: list[list[Conversion]], *, named: bool, free: bool) -> 
     lines = []
     for conversion in conversions:
         words = [conversion.target] if named else []
-        words.append(value_text(conversion.result))
+        words.append(tables.value_text(conversion.result))
         if free and conversion.gamma is not None:
-            words.append(value_text(conversion.gamma))
+            words.append(tables.value_text(conversion.gamma))
         lines.append(" ".join(words))
     typer.echo("\n".join(lines))
 
 
 def _print_group(group: list[Conversion], gamma: Gamma, exposure: float | None) -> None:
     """Print the conversions to a target by every method, and the fits under the other metrics."""
-    out = console()
+    out = tables.console()
     headings = _headings(group[0])
     rows: list[dict[str, Any]] = []
     styles: list[str] = []
-    for conversion in group[:ROWS_SHOWN]:
+    for conversion in group[: tables.ROWS_SHOWN]:
         rows.append(_row(conversion, headings))
         styles.append("bold")
         if len(group) <= _VALUES_WITH_ALTERNATIVES and not conversion.exact:
@@ -294,7 +273,7 @@ def _print_group(group: list[Conversion], gamma: Gamma, exposure: float | None) 
             rows += [_row(other, headings, first=False) for other in others]
             styles += ["dim"] * len(others)
     title = f"{' → '.join(headings[:2])}, {group[0].metric}"
-    print_table(list(rows[0]), rows, title, styles, count=len(group))
+    tables.print_table(list(rows[0]), rows, title, styles, count=len(group))
     for caution in dict.fromkeys(text for conversion in group for text in conversion.cautions):
         out.print(f"Note: {caution}.")
     inexact = [conversion for conversion in group if not conversion.exact]
@@ -314,7 +293,7 @@ def _print_group(group: list[Conversion], gamma: Gamma, exposure: float | None) 
             metric = metric_named(other.metric)
             row = _row(other, headings, first=number == 0)
             rows.append(row | {"fit under": str(metric), "for": metric.purpose})
-    print_table([*headings, "fit under", "for"], rows, "Fits under the other metrics")
+    tables.print_table([*headings, "fit under", "for"], rows, "Fits under the other metrics")
 
 
 def _by_other_methods(chosen: Conversion, gamma: Gamma) -> list[Conversion]:
@@ -329,7 +308,7 @@ def _under_other_metrics(
     chosen: Conversion, gamma: Gamma, exposure: float | None
 ) -> list[Conversion]:
     """Return the fits of a value under the other metrics."""
-    metrics = [metric for metric in every_metric(exposure) if str(metric) != chosen.metric]
+    metrics = [metric for metric in options.every_metric(exposure) if str(metric) != chosen.metric]
     return _others(chosen, [(None, metric) for metric in metrics], gamma)
 
 

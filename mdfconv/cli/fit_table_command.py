@@ -6,16 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.options import (
-    ExposureOption,
-    ForceOption,
-    FormatOption,
-    MetricOption,
-    OutputOption,
-    chosen_metric,
-    every_metric,
-    refuse_given,
-)
+from mdfconv.cli import options
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import progress, write_table
 from mdfconv.distributions.parameter import percent_hint
@@ -29,11 +20,10 @@ _LARGEST_SWEEP = 10_000
 
 def command(
     context: typer.Context,
-    format_: FormatOption = None,
-    output: OutputOption = None,
+    format_: options.FormatOption = None,
+    output: options.OutputOption = None,
     compare: Annotated[
-        bool,
-        typer.Option("--compare", help="Put each printed cell of the paper beside ours."),
+        bool, typer.Option("--compare", help="Put each printed cell of the paper beside ours.")
     ] = False,
     sweep: Annotated[
         str | None,
@@ -46,17 +36,15 @@ def command(
     m_b: Annotated[
         list[float] | None, typer.Option("--m-b", metavar="M", help="Fit this m_B; repeatable.")
     ] = None,
-    metric: MetricOption = "unit",
-    exposure: ExposureOption = None,
+    metric: options.MetricOption = "unit",
+    exposure: options.ExposureOption = None,
     extended: Annotated[
-        bool,
-        typer.Option("--extended", help="Add what the paper's table lacks, with γ."),
+        bool, typer.Option("--extended", help="Add what the paper's table lacks, with γ.")
     ] = False,
     closed_forms: Annotated[
-        bool,
-        typer.Option("--closed-forms", help="Refit the coefficients of the paper's formulas."),
+        bool, typer.Option("--closed-forms", help="Refit the coefficients of the paper's formulas.")
     ] = False,
-    force: ForceOption = False,
+    force: options.ForceOption = False,
 ) -> None:
     """Reproduce Table 2 of Sawicki 2021: Beckmann fitted by the others over a sweep of m_B.
 
@@ -80,9 +68,11 @@ def command(
             "--compare and --closed-forms speak of the paper's rows: give one of them, without "
             "--sweep, --m-b or --extended"
         )
-    chosen = chosen_metric(metric, exposure)
+    chosen = options.chosen_metric(metric, exposure)
     if closed_forms:
-        refuse_given(context, ["metric"], "does not go with --closed-forms, which has every metric")
+        options.refuse_given(
+            context, ["metric"], "does not go with --closed-forms, which has every metric"
+        )
     if compare and chosen.name != "unit":
         raise MdfconvError("--compare: the paper's table has the unit metric only")
     outputs = Outputs(table=output, force=force, inputs=chosen.inputs)
@@ -90,7 +80,7 @@ def command(
     if closed_forms:
         from mdfconv.studies.table2 import refit_rows
 
-        rows = refit_rows(every_metric(exposure))
+        rows = refit_rows(options.every_metric(exposure))
         title = "Closed forms: coefficients and worst relative error"
         minor = ["formula", "worst_printed", "printed"]
     elif compare:

@@ -6,20 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import (
-    ExposureOption,
-    FixedGammaOption,
-    FormatOption,
-    FromOption,
-    MetricOption,
-    SpecularOption,
-    ToOption,
-    chosen_metric,
-    fixed_gamma,
-    noted,
-    refuse_given,
-)
+from mdfconv.cli import completion, options
 from mdfconv.cli.tables import write_table
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
@@ -32,8 +19,8 @@ _COLUMNS = ("operations", "worst_error", "formula")
 
 def command(
     context: typer.Context,
-    source: FromOption,
-    target: ToOption,
+    source: options.FromOption,
+    target: options.ToOption,
     tolerance: Annotated[
         float,
         typer.Option(metavar="T", help="Worst relative error against the fit that is accepted."),
@@ -47,10 +34,10 @@ def command(
             "0.1:0.9, exponents 1:10000.",
         ),
     ] = None,
-    metric: MetricOption = "environment",
-    exposure: ExposureOption = None,
-    gamma: FixedGammaOption = None,
-    specular: SpecularOption = None,
+    metric: options.MetricOption = "environment",
+    exposure: options.ExposureOption = None,
+    gamma: options.FixedGammaOption = None,
+    specular: options.SpecularOption = None,
     language: Annotated[
         str,
         typer.Option(
@@ -66,7 +53,7 @@ def command(
             "--all", help="Print the table of cost against error instead, in that language."
         ),
     ] = False,
-    format_: FormatOption = None,
+    format_: options.FormatOption = None,
 ) -> None:
     """Print the cheapest formula for a conversion, to paste into a shader or an importer.
 
@@ -88,16 +75,18 @@ def command(
     from mdfconv.formula import LANGUAGES, SearchProblem, cheapest, write_formula
 
     if every:
-        refuse_given(context, ["tolerance"], "does not go with --all, which has every error")
+        options.refuse_given(
+            context, ["tolerance"], "does not go with --all, which has every error"
+        )
     else:
-        refuse_given(
+        options.refuse_given(
             context, ["format_"], "is the form of the table of --all: a formula has --lang"
         )
     LANGUAGES[language]  # names are wrong more often than ranges
-    first, last = endpoints(*with_specular(source, target, specular), fixed_gamma(gamma))
-    ends = noted(first), noted(last)
+    first, last = endpoints(*with_specular(source, target, specular), options.fixed_gamma(gamma))
+    ends = options.noted(first), options.noted(last)
     low, high = ends[0].stored.typical if range_ is None else _range(range_)
-    problem = SearchProblem(*ends, chosen_metric(metric, exposure), low, high)
+    problem = SearchProblem(*ends, options.chosen_metric(metric, exposure), low, high)
     if every:
         title = f"Formulas from {ends[0].label} to {ends[1].label}, {low:g} to {high:g}"
         write_table(_COLUMNS, _rows(problem, language), format_, title=title)

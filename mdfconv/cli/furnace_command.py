@@ -6,14 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import (
-    ForceOption,
-    FormatOption,
-    OutputOption,
-    PngOption,
-    refuse_given,
-)
+from mdfconv.cli import completion, options
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 from mdfconv.errors import MdfconvError
@@ -69,10 +62,10 @@ def command(
         typer.Option("--mc", metavar="N", help="Estimate by N random directions a cosine, too."),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="S", help="Of the random numbers.")] = 0,
-    png: PngOption = None,
-    format_: FormatOption = None,
-    output: OutputOption = None,
-    force: ForceOption = False,
+    png: options.PngOption = None,
+    format_: options.FormatOption = None,
+    output: options.OutputOption = None,
+    force: options.ForceOption = False,
 ) -> None:
     """Put a BRDF that absorbs nothing into a white furnace: how much light comes back.
 
@@ -93,7 +86,7 @@ def command(
     from mdfconv.studies.furnace import furnace_model
 
     if samples is None:
-        refuse_given(context, ["seed"], "goes with --mc")
+        options.refuse_given(context, ["seed"], "goes with --mc")
     if not 2 <= points <= _MOST_POINTS:
         raise MdfconvError(f"--points is from 2 to {_MOST_POINTS}")
     if samples is not None and not 2 <= samples <= _MOST_SAMPLES:

@@ -6,24 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.material_files import (
-    InPlaceOption,
-    MaterialReport,
-    ReportFormat,
-    ReportFormatOption,
-    ResultOption,
-    about,
-    convert_files,
-)
-from mdfconv.cli.options import (
-    ExposureOption,
-    ForceOption,
-    MetricOption,
-    SpecularOption,
-    chosen_metric,
-    refuse_given,
-)
+from mdfconv.cli import completion, material_files, options
 from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
 
@@ -49,7 +32,7 @@ def command(
         list[str],
         typer.Argument(metavar="IN.glb...", help="glTF or GLB files, or patterns such as '*.glb'."),
     ],
-    output: ResultOption = None,
+    output: material_files.ResultOption = None,
     source: Annotated[
         str | None,
         typer.Option(
@@ -69,11 +52,11 @@ def command(
             help="What the factors become; if not given ggx:roughness, as glTF defines them.",
         ),
     ] = None,
-    metric: MetricOption = "environment",
-    exposure: ExposureOption = None,
-    specular: SpecularOption = None,
-    in_place: InPlaceOption = False,
-    force: ForceOption = False,
+    metric: options.MetricOption = "environment",
+    exposure: options.ExposureOption = None,
+    specular: options.SpecularOption = None,
+    in_place: material_files.InPlaceOption = False,
+    force: options.ForceOption = False,
     textures: Annotated[
         bool,
         typer.Option(
@@ -81,8 +64,7 @@ def command(
         ),
     ] = False,
     lossy: Annotated[
-        bool,
-        typer.Option("--lossy", help="Take JPEG textures, although altered; they become PNG."),
+        bool, typer.Option("--lossy", help="Take JPEG textures, although altered; they become PNG.")
     ] = False,
     guess: Annotated[
         bool,
@@ -96,7 +78,7 @@ def command(
             "--compare", help="Add what importers' rules make of the exponents, and their error."
         ),
     ] = False,
-    format_: ReportFormatOption = ReportFormat.table,
+    format_: material_files.ReportFormatOption = material_files.ReportFormat.table,
 ) -> None:
     """Repair the roughness factors of glTF 2.0 files whose writer had exponents.
 
@@ -123,17 +105,19 @@ def command(
     if guess:
         others = {option.name for option in context.command.params if option.name}
         others -= {"files", "guess"}
-        refuse_given(context, others, "does not go with --guess, which only proposes --from")
+        options.refuse_given(
+            context, others, "does not go with --guess, which only proposes --from"
+        )
         _propose(files)
         return
     if not textures:
-        refuse_given(context, ["lossy"], "goes with --textures")
+        options.refuse_given(context, ["lossy"], "goes with --textures")
     if source is None:
         raise MdfconvError(
             "the rule by which the factors were stored is missing: give --from",
             "--guess proposes one",
         )
-    chosen = chosen_metric(metric, exposure)
+    chosen = options.chosen_metric(metric, exposure)
     names = with_specular(source, target or ROUGHNESS, specular)
     # A mistake in the names is none of a file.
     pair = factor_endpoints(*names)
@@ -143,14 +127,14 @@ def command(
     def convert(destination: Destination, data: bytes) -> GltfConversion:
         _check_form(destination, data)
         folders = GltfTextures(destination.source.parent, destination.output.parent, lossy)
-        with about(destination.source):
+        with material_files.about(destination.source):
             conversion = convert_gltf(
                 data, *pair, metric=chosen, textures=folders if textures else None
             )
         _tell_other_generator(destination.source, conversion.generator, pair[0])
         return conversion
 
-    report = MaterialReport(
+    report = material_files.MaterialReport(
         form=format_,
         metric=chosen,
         keys=_KEYS,
@@ -164,7 +148,9 @@ def command(
         remedies={ProblemKind.TEXTURE: ": --textures converts it", ProblemKind.LOSSY: " (--lossy)"},
         exponent="parameter" if compare else "",
     )
-    convert_files(context, files, output, convert, report, in_place=in_place, force=force)
+    material_files.convert_files(
+        context, files, output, convert, report, in_place=in_place, force=force
+    )
 
 
 def _check_form(destination: Destination, data: bytes) -> None:
@@ -213,7 +199,7 @@ def _propose(files: list[str]) -> None:
 
     lines = []
     for path in find_files(files):
-        with about(path):
+        with material_files.about(path):
             generator = generator_of(read_file(path))
         proposals = _proposals(generator).values()
         said = f"asset.generator is '{generator}'" if generator else "no asset.generator"

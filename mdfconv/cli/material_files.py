@@ -48,8 +48,7 @@ ResultOption = Annotated[
     ),
 ]
 InPlaceOption = Annotated[
-    bool,
-    typer.Option("--in-place", help="Change the file itself; the original is kept as .bak."),
+    bool, typer.Option("--in-place", help="Change the file itself; the original is kept as .bak.")
 ]
 ReportFormatOption = Annotated[
     ReportFormat,

@@ -7,17 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.material_files import (
-    InPlaceOption,
-    MaterialReport,
-    ReportFormat,
-    ReportFormatOption,
-    ResultOption,
-    Rows,
-    about,
-    convert_files,
-)
+from mdfconv.cli import completion, material_files
 from mdfconv.cli.options import ExposureOption, ForceOption, MetricOption, chosen_metric
 from mdfconv.cli.process import tell
 
@@ -39,10 +29,9 @@ _KEYS = (
 def command(
     context: typer.Context,
     scenes: Annotated[
-        list[str],
-        typer.Argument(metavar="IN.xml...", help="Scenes, or patterns such as '*.xml'."),
+        list[str], typer.Argument(metavar="IN.xml...", help="Scenes, or patterns such as '*.xml'.")
     ],
-    output: ResultOption = None,
+    output: material_files.ResultOption = None,
     to: Annotated[
         str,
         typer.Option(
@@ -53,17 +42,16 @@ def command(
     ] = "ggx",
     metric: MetricOption = "environment",
     exposure: ExposureOption = None,
-    in_place: InPlaceOption = False,
+    in_place: material_files.InPlaceOption = False,
     force: ForceOption = False,
     textures: Annotated[
         bool,
         typer.Option("--textures", help="Convert the bitmaps of alpha, too, beside the result."),
     ] = False,
     compare: Annotated[
-        bool,
-        typer.Option("--compare", help="Add what is left if alpha is kept: its error."),
+        bool, typer.Option("--compare", help="Add what is left if alpha is kept: its error.")
     ] = False,
-    format_: ReportFormatOption = ReportFormat.table,
+    format_: material_files.ReportFormatOption = material_files.ReportFormat.table,
 ) -> None:
     """Convert the distribution of rough BSDFs in Mitsuba scenes (0.6 and 3).
 
@@ -94,7 +82,7 @@ def command(
                 file, TextureRule(distribution, target, metric=str(chosen)), target
             )
 
-        with about(destination.source):
+        with material_files.about(destination.source):
             conversion = convert_mitsuba(
                 data, target, metric=chosen, texture=texture if textures else None
             )
@@ -103,12 +91,14 @@ def command(
         files = {path: data for path, data in folder.files.items() if path.name in names}
         return dataclasses.replace(conversion, files=files, inputs=folder.inputs)
 
-    def add_unchanged_errors(materials: Sequence[MitsubaMaterial], rows: Rows) -> None:
+    def add_unchanged_errors(
+        materials: Sequence[MitsubaMaterial], rows: material_files.Rows
+    ) -> None:
         errors = unchanged_errors(materials, target, chosen)
         for row, error in zip(rows, errors, strict=True):
             row["rmse_unchanged"] = error
 
-    report = MaterialReport(
+    report = material_files.MaterialReport(
         form=format_,
         metric=chosen,
         keys=_KEYS,
@@ -123,7 +113,9 @@ def command(
         compare=add_unchanged_errors if compare else None,
         print_more=_print_more,
     )
-    convert_files(context, scenes, output, convert, report, in_place=in_place, force=force)
+    material_files.convert_files(
+        context, scenes, output, convert, report, in_place=in_place, force=force
+    )
 
 
 def _print_more(record: dict[str, Any]) -> None:

@@ -7,23 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.material_files import (
-    InPlaceOption,
-    MaterialReport,
-    ReportFormat,
-    ReportFormatOption,
-    ResultOption,
-    about,
-    convert_files,
-)
-from mdfconv.cli.options import (
-    ExposureOption,
-    ForceOption,
-    MetricOption,
-    chosen_metric,
-    refuse_given,
-)
+from mdfconv.cli import completion, material_files, options
 from mdfconv.cli.tables import progress
 from mdfconv.errors import MdfconvError
 
@@ -45,7 +29,7 @@ def command(
             metavar="IN.mtl...", help="Material libraries, or patterns such as '*.mtl'."
         ),
     ],
-    output: ResultOption = None,
+    output: material_files.ResultOption = None,
     to: Annotated[
         str,
         typer.Option(
@@ -54,13 +38,13 @@ def command(
             help="roughness (Pr from Ns) or shininess (Ns from Pr, the inverse).",
         ),
     ] = "roughness",
-    metric: MetricOption = "environment",
-    exposure: ExposureOption = None,
+    metric: options.MetricOption = "environment",
+    exposure: options.ExposureOption = None,
     replace: Annotated[
         bool, typer.Option("--replace", help="Drop the statement that was converted.")
     ] = False,
-    in_place: InPlaceOption = False,
-    force: ForceOption = False,
+    in_place: material_files.InPlaceOption = False,
+    force: options.ForceOption = False,
     textures: Annotated[
         bool,
         typer.Option(
@@ -68,14 +52,13 @@ def command(
         ),
     ] = False,
     exponent_max: Annotated[
-        float,
-        typer.Option(metavar="N", help="Exponent of a white texel in those textures."),
+        float, typer.Option(metavar="N", help="Exponent of a white texel in those textures.")
     ] = 1000.0,
     compare: Annotated[
         bool,
         typer.Option("--compare", help="Add what importers' rules make of Ns, and their error."),
     ] = False,
-    format_: ReportFormatOption = ReportFormat.table,
+    format_: material_files.ReportFormatOption = material_files.ReportFormat.table,
 ) -> None:
     """Convert the shininess of Wavefront material libraries to roughness, or back.
 
@@ -101,8 +84,8 @@ def command(
     if to != "roughness" and (compare or textures):
         raise MdfconvError("--compare and --textures go with --to roughness")
     if not textures:
-        refuse_given(context, ["exponent_max"], "goes with --textures")
-    chosen = chosen_metric(metric, exposure)
+        options.refuse_given(context, ["exponent_max"], "goes with --textures")
+    chosen = options.chosen_metric(metric, exposure)
     # A mistake in it is none of a library.
     rule = texture_rule(chosen, exponent_max)
 
@@ -112,7 +95,7 @@ def command(
         problems: list[MaterialProblem] = []
         if textures:
             names, problems = convert_library_textures(data, folder, rule, progress)
-        with about(destination.source):
+        with material_files.about(destination.source):
             conversion = convert_mtl(data, to, metric=chosen, replace=replace, texture_names=names)
         return dataclasses.replace(
             conversion,
@@ -121,7 +104,7 @@ def command(
             problems=(*problems, *conversion.problems),
         )
 
-    report = MaterialReport(
+    report = material_files.MaterialReport(
         form=format_,
         metric=chosen,
         keys=["file", "output", "metric", "materials", "textures", "problems", "notes"],
@@ -130,4 +113,6 @@ def command(
         remedies={ProblemKind.TEXTURE: ": --textures converts it"},
         exponent="shininess" if compare else "",
     )
-    convert_files(context, libraries, output, convert, report, in_place=in_place, force=force)
+    material_files.convert_files(
+        context, libraries, output, convert, report, in_place=in_place, force=force
+    )

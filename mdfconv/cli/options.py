@@ -108,8 +108,7 @@ FormatOption = Annotated[
     ),
 ]
 OutputOption = Annotated[
-    Path | None,
-    typer.Option("--output", "-o", metavar="FILE", help="Write to a file instead."),
+    Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write to a file instead.")
 ]
 FolderOption = Annotated[
     Path | None,

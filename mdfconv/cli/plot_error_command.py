@@ -7,20 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import (
-    DpiOption,
-    ExposureOption,
-    FolderOption,
-    ForceOption,
-    FormatOption,
-    MethodOption,
-    OptionalMetricOption,
-    asked_endpoint,
-    asked_metric,
-    in_asked_forms,
-    refuse_given,
-)
+from mdfconv.cli import completion, options
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
 from mdfconv.cli.tables import write_table
 from mdfconv.distributions import one_parameter_distribution
@@ -40,9 +27,9 @@ def command(
         list[float] | None,
         typer.Option("--m-b", metavar="M", help="Beckmann's m_B; repeatable; default the paper's."),
     ] = None,
-    method: MethodOption = None,
-    metric: OptionalMetricOption = None,
-    exposure: ExposureOption = None,
+    method: options.MethodOption = None,
+    metric: options.OptionalMetricOption = None,
+    exposure: options.ExposureOption = None,
     reference: Annotated[
         str,
         typer.Option(
@@ -60,15 +47,15 @@ def command(
             "ggx:roughness; repeatable.",
         ),
     ] = None,
-    output: FolderOption = None,
-    force: ForceOption = False,
+    output: options.FolderOption = None,
+    force: options.ForceOption = False,
     png: Annotated[bool, typer.Option("--png/--no-png", help="Write pictures.")] = True,
     csv: Annotated[bool, typer.Option("--csv/--no-csv", help="Write the errors.")] = True,
     svg: Annotated[bool, typer.Option("--svg", help="Write pictures as SVG, too.")] = False,
-    dpi: DpiOption = 150,
+    dpi: options.DpiOption = 150,
     points: Annotated[int, typer.Option(metavar="N", help="Angles a curve.")] = 1001,
     log: Annotated[bool, typer.Option("--log", help="Logarithmic, for the tails.")] = False,
-    format_: FormatOption = None,
+    format_: options.FormatOption = None,
 ) -> None:
     """Draw distributions and their error: Figures 1 and 2 of Sawicki 2021.
 
@@ -87,10 +74,10 @@ def command(
     from mdfconv.studies.error_curves import curves, draw_errors
 
     if not png and not svg:
-        refuse_given(context, ["dpi", "log"], "is of pictures: give no --no-png, or --svg")
-    chosen = asked_metric(metric, exposure)
+        options.refuse_given(context, ["dpi", "log"], "is of pictures: give no --no-png, or --svg")
+    chosen = options.asked_metric(metric, exposure)
     reference = one_parameter_distribution(reference).name
-    endpoints = [asked_endpoint(name) for name in mdf or ()]
+    endpoints = [options.asked_endpoint(name) for name in mdf or ()]
     names = [one.distribution.name for one in endpoints]
     sets = _parameter_sets(m_b, method, chosen, reference, names)
     forms = [*["png"] * png, *["svg"] * svg]
@@ -106,7 +93,9 @@ def command(
             contents[folder / f"{name}.{form}"] = picture
         if csv:
             contents[folder / f"{name}b.csv"] = file_bytes(drawn.error_text())
-        rows += [{"figure": name} | row for row in in_asked_forms(drawn.maxima(), endpoints)]
+        rows += [
+            {"figure": name} | row for row in options.in_asked_forms(drawn.maxima(), endpoints)
+        ]
     title = f"Largest error against {reference}"
     write_table(_COLUMNS, rows, format_, outputs, beside=contents, title=title)
 

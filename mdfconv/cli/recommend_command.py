@@ -6,17 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli.options import (
-    ExposureOption,
-    FixedGammaOption,
-    Format,
-    FormatOption,
-    FromOption,
-    MetricOption,
-    asked_endpoint,
-    chosen_metric,
-    fixed_gamma,
-)
+from mdfconv.cli import options
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import console, form_of, print_table, table_text, value_text
 from mdfconv.output.records import json_text
@@ -37,7 +27,7 @@ _HEADINGS = {
 
 def command(
     value: Annotated[float, typer.Argument(metavar="VALUE", help="Parameter of the surface.")],
-    source: FromOption,
+    source: options.FromOption,
     tolerance: Annotated[
         float,
         typer.Option(
@@ -45,10 +35,10 @@ def command(
             help="Largest maximum error allowed under the metric, relative to the source's.",
         ),
     ] = 0.05,
-    metric: MetricOption = "environment",
-    exposure: ExposureOption = None,
-    gamma: FixedGammaOption = None,
-    format_: FormatOption = None,
+    metric: options.MetricOption = "environment",
+    exposure: options.ExposureOption = None,
+    gamma: options.FixedGammaOption = None,
+    format_: options.FormatOption = None,
 ) -> None:
     """Recommend the cheapest distribution and conversion for a surface.
 
@@ -69,25 +59,25 @@ def command(
     from mdfconv.distributions.endpoint import with_gamma
     from mdfconv.recommend import recommend
 
-    end = with_gamma(asked_endpoint(source), fixed_gamma(gamma))
-    kept = chosen_metric(metric, exposure)
+    end = with_gamma(options.asked_endpoint(source), options.fixed_gamma(gamma))
+    kept = options.chosen_metric(metric, exposure)
     recommendation = recommend(
         end.distribution, end.decode_one(value), one_parameter_distributions(), kept, tolerance
     )
     asked = {"from": end.label, "value": value, "metric": str(kept), "tolerance": tolerance}
-    _write(recommendation, asked, form_of(format_, in_pipe=Format.plain))
+    _write(recommendation, asked, form_of(format_, in_pipe=options.Format.plain))
 
 
-def _write(recommendation: Recommendation, asked: dict[str, Any], form: Format) -> None:
+def _write(recommendation: Recommendation, asked: dict[str, Any], form: options.Format) -> None:
     rows, reason = recommendation.records(), recommendation.reason
     columns, answers = list(rows[0]), recommendation.chosen
     sentence = reason[0].upper() + reason[1:]
-    if form is Format.json:
+    if form is options.Format.json:
         chosen = {use: vars(candidate) for use, candidate in answers.items()}
         typer.echo(json_text(asked | chosen | {"reason": reason, "candidates": rows}))
-    elif form is Format.markdown:
+    elif form is options.Format.markdown:
         typer.echo(f"{table_text(columns, rows, form)}\n\n{sentence}")
-    elif form is Format.table:
+    elif form is options.Format.table:
         out = console()
         _print_table(rows, asked)
         out.print(sentence)
@@ -97,7 +87,9 @@ def _write(recommendation: Recommendation, asked: dict[str, Any], form: Format) 
             f"{use} {answer.distribution} {value_text(answer.parameter)} {answer.method}"
             for use, answer in answers.items()
         ]
-        typer.echo("\n".join(lines) if form is Format.plain else table_text(columns, rows, form))
+        typer.echo(
+            "\n".join(lines) if form is options.Format.plain else table_text(columns, rows, form)
+        )
         tell(reason)
 
 

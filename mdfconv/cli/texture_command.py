@@ -8,20 +8,7 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import (
-    ExposureOption,
-    FixedGammaOption,
-    ForceOption,
-    MethodOption,
-    MetricOption,
-    PngOption,
-    SpecularOption,
-    chosen_metric,
-    fixed_gamma,
-    refuse_given,
-    refuse_idle_metric,
-)
+from mdfconv.cli import completion, options
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import progress
@@ -70,11 +57,11 @@ def command(
             "there are several.",
         ),
     ] = None,
-    method: MethodOption = None,
-    metric: MetricOption = "environment",
-    exposure: ExposureOption = None,
-    gamma: FixedGammaOption = None,
-    specular: SpecularOption = None,
+    method: options.MethodOption = None,
+    metric: options.MetricOption = "environment",
+    exposure: options.ExposureOption = None,
+    gamma: options.FixedGammaOption = None,
+    specular: options.SpecularOption = None,
     exponent_max: Annotated[
         float, typer.Option(metavar="N", help="Exponent of the brightest texel, for exponent.")
     ] = 1000.0,
@@ -92,8 +79,8 @@ def command(
         int | None,
         typer.Option(metavar="N", min=1, help="Largest picture to decode; default 134217728."),
     ] = None,
-    png: PngOption = None,
-    force: ForceOption = False,
+    png: options.PngOption = None,
+    force: options.ForceOption = False,
 ) -> None:
     """Convert a roughness texture, texel by texel.
 
@@ -117,8 +104,8 @@ def command(
     from mdfconv.scene.texture.rule import TextureRule
 
     _check_given(context, source, target)
-    refuse_idle_metric(context, method)
-    chosen = chosen_metric(metric, exposure)
+    options.refuse_idle_metric(context, method)
+    chosen = options.chosen_metric(metric, exposure)
     outputs = Outputs(output, png, force=force, inputs=[source_file, *chosen.inputs])
     rule = TextureRule(
         *with_specular(source, target, specular),
@@ -126,7 +113,7 @@ def command(
         str(chosen),
         exponent_max,
         log2_scale,
-        fixed_gamma(gamma),
+        options.fixed_gamma(gamma),
     )
     with outputs.staged() as files:
         report = convert_texture_file(
@@ -158,4 +145,4 @@ def _check_given(context: typer.Context, *names: str) -> None:
     encodings = [name.partition(":")[2].strip().lower() for name in names]
     for option, encoding in (("exponent_max", "exponent"), ("log2_scale", "log2")):
         if encoding not in encodings:
-            refuse_given(context, [option], f"goes with blinn-phong:{encoding}")
+            options.refuse_given(context, [option], f"goes with blinn-phong:{encoding}")

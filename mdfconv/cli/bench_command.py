@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption, asked_endpoint
+from mdfconv.cli import completion, options
+from mdfconv.cli.options import flag, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import form_of, progress, table_text, write_table
 from mdfconv.output.files import file_bytes
@@ -24,51 +24,33 @@ _REFERENCE, _PARAMETERS = "beckmann", (0.2, 0.05)
 def command(
     reference: Annotated[
         str,
-        typer.Option(
-            metavar="MDF",
-            autocompletion=completion.endpoints,
-            help="Distribution that the others take the place of.",
+        option(
+            "MDF", "Distribution that the others take the place of.", words=completion.endpoints
         ),
     ] = _REFERENCE,
     parameter: Annotated[
         list[float] | None,
-        typer.Option(
-            metavar="P",
-            help="Its parameter; repeatable; by default lobes as wide as beckmann's at 0.2 and "
-            "0.05.",
+        option(
+            "P",
+            "Its parameter; repeatable; by default lobes as wide as beckmann's at 0.2 and 0.05.",
         ),
     ] = None,
     source: Annotated[
         str,
-        typer.Option(
-            "--from",
-            metavar="MDF",
-            autocompletion=completion.distributions,
-            help="Source of the timed conversions.",
-        ),
+        option("MDF", "Source of the timed conversions.", "--from", words=completion.distributions),
     ] = _REFERENCE,
     target: Annotated[
         str,
-        typer.Option(
-            "--to",
-            metavar="MDF",
-            autocompletion=completion.distributions,
-            help="Target of the timed conversions.",
-        ),
+        option("MDF", "Target of the timed conversions.", "--to", words=completion.distributions),
     ] = "ggx",
     quick: Annotated[
-        bool,
-        typer.Option("--quick", help="Less than a minute in place of some: fewer values, rounds."),
+        bool, flag("--quick", "Less than a minute in place of some: fewer values, rounds.")
     ] = False,
-    format_: FormatOption = None,
-    csv: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the tables as one CSV.")
-    ] = None,
-    json: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write tables and machine as JSON.")
-    ] = None,
-    png: PngOption = None,
-    force: ForceOption = False,
+    format_: options.FormatOption = None,
+    csv: Annotated[Path | None, option("FILE", "Write the tables as one CSV.")] = None,
+    json: Annotated[Path | None, option("FILE", "Write tables and machine as JSON.")] = None,
+    png: options.PngOption = None,
+    force: options.ForceOption = False,
 ) -> None:
     """Measure speed against error on this machine.
 
@@ -115,7 +97,7 @@ def _task(
     from mdfconv.distributions import one_parameter_distribution, one_parameter_distributions
     from mdfconv.studies.bench import FULL, QUICK, Task
 
-    end = asked_endpoint(reference)
+    end = options.asked_endpoint(reference)
     mdf = end.distribution
     if parameter:
         # The kernels compute in single precision, too.
@@ -132,14 +114,14 @@ def _task(
     )
 
 
-def _print(measurements: Measurements, form: Format, png: Path | None) -> None:
+def _print(measurements: Measurements, form: options.Format, png: Path | None) -> None:
     from mdfconv.studies import bench_page
 
-    if form is Format.csv:
+    if form is options.Format.csv:
         typer.echo(_csv(measurements))
-    elif form is Format.json:
+    elif form is options.Format.json:
         typer.echo(_json(measurements))
-    elif form is Format.markdown:
+    elif form is options.Format.markdown:
         typer.echo(bench_page.markdown_page(measurements, png.name if png else None))
     else:
         for name, rows in bench_page.tables(measurements).items():
@@ -151,7 +133,7 @@ def _csv(measurements: Measurements) -> str:
     columns = dict.fromkeys(name for rows in tables.values() for row in rows for name in row)
     blank = dict.fromkeys(columns)
     rows = [{"table": name} | blank | row for name, table in tables.items() for row in table]
-    return table_text(["table", *columns], rows, Format.csv)
+    return table_text(["table", *columns], rows, options.Format.csv)
 
 
 def _json(measurements: Measurements) -> str:

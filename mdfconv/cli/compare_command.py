@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import completion, options
+from mdfconv.cli.options import argument, option
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import form_of, write_table
@@ -57,35 +58,29 @@ def command(
     context: typer.Context,
     values: Annotated[
         list[float] | None,
-        typer.Argument(
-            metavar="[VALUE]...",
-            help="Parameters of the source; of beckmann 0.4 and 0.04464 if not given.",
+        argument(
+            "[VALUE]...",
+            "Parameters of the source; of beckmann 0.4 and 0.04464 if not given.",
             show_default=False,
         ),
     ] = None,
     source: options.FromOption = _REFERENCE,
     targets: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            "MDF",
+            "What takes its place, as for --from; repeatable; the paper's if not given.",
             "--to",
-            metavar="MDF",
-            autocompletion=completion.targets,
-            help="What takes its place, as for --from; repeatable; the paper's if not given.",
+            words=completion.targets,
         ),
     ] = None,
     method: options.MethodOption = None,
     metric: Annotated[
-        str | None,
-        typer.Option(
-            metavar="METRIC", autocompletion=completion.metrics, help="What --method fit keeps."
-        ),
+        str | None, option("METRIC", "What --method fit keeps.", words=completion.metrics)
     ] = None,
     exposure: Annotated[
         float,
-        typer.Option(
-            metavar="E",
-            help="Exposure: 1 displays the source's peak, or its brightest channel, as white.",
-        ),
+        option("E", "Exposure: 1 displays the source's peak, or its brightest channel, as white."),
     ] = 1.0,
     light: Annotated[LightName, typer.Option(help="A directional light or a square one.")] = (
         LightName.directional
@@ -95,20 +90,20 @@ def command(
     ] = Brdf.ashikhmin_shirley,
     material: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME",
-            autocompletion=completion.materials,
-            help="What is reflected: gold, silver, copper, nickel, iron or chrome, in colour; "
+        option(
+            "NAME",
+            "What is reflected: gold, silver, copper, nickel, iron or chrome, in colour; "
             "acrylic, polycarbonate, polystyrene, polyethylene, polypropylene or pvc.",
+            words=completion.materials,
         ),
     ] = None,
     normalized: Annotated[bool, typer.Option("--normalized/--unit", help="The form of D.")] = True,
-    size: Annotated[int, typer.Option(metavar="N", help="Pixels a side of a picture.")] = 256,
+    size: Annotated[int, option("N", "Pixels a side of a picture.")] = 256,
     html: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Write a page with sliders instead, from the first VALUE and for the first --to. "
+        option(
+            "FILE",
+            "Write a page with sliders instead, from the first VALUE and for the first --to. "
             "Pictures, too, only with --output.",
         ),
     ] = None,

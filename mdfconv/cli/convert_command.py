@@ -13,6 +13,7 @@ import numpy as np
 import typer
 
 from mdfconv.cli import options, tables
+from mdfconv.cli.options import argument
 from mdfconv.cli.process import tell
 from mdfconv.conversion import Conversion, explain, list_methods
 from mdfconv.conversion.explanation import explained
@@ -36,9 +37,9 @@ _DECIMAL_COMMA = re.compile(r"\s*[+-]?0,\d+\s*\Z")
 def command(
     values: Annotated[
         list[str],
-        typer.Argument(
-            metavar="VALUE...",
-            help="Parameters of the source; a pair X,Y for an anisotropic surface; - reads "
+        argument(
+            "VALUE...",
+            "Parameters of the source; a pair X,Y for an anisotropic surface; - reads "
             "values from standard input, one a line.",
         ),
     ],

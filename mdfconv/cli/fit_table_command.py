@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import options
+from mdfconv.cli.options import flag, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import progress, write_table
 from mdfconv.distributions.parameter import percent_hint
@@ -23,26 +24,24 @@ def command(
     format_: options.FormatOption = None,
     output: options.OutputOption = None,
     compare: Annotated[
-        bool, typer.Option("--compare", help="Put each printed cell of the paper beside ours.")
+        bool, flag("--compare", "Put each printed cell of the paper beside ours.")
     ] = False,
     sweep: Annotated[
         str | None,
-        typer.Option(
-            metavar="LO:HI:COUNT",
-            help="Fit other m_B, spaced logarithmically; unit forms on β up to 4 m_B, where the "
+        option(
+            "LO:HI:COUNT",
+            "Fit other m_B, spaced logarithmically; unit forms on β up to 4 m_B, where the "
             "paper's rows have limits of their own.",
         ),
     ] = None,
-    m_b: Annotated[
-        list[float] | None, typer.Option("--m-b", metavar="M", help="Fit this m_B; repeatable.")
-    ] = None,
+    m_b: Annotated[list[float] | None, option("M", "Fit this m_B; repeatable.")] = None,
     metric: options.MetricOption = "unit",
     exposure: options.ExposureOption = None,
     extended: Annotated[
-        bool, typer.Option("--extended", help="Add what the paper's table lacks, with γ.")
+        bool, flag("--extended", "Add what the paper's table lacks, with γ.")
     ] = False,
     closed_forms: Annotated[
-        bool, typer.Option("--closed-forms", help="Refit the coefficients of the paper's formulas.")
+        bool, flag("--closed-forms", "Refit the coefficients of the paper's formulas.")
     ] = False,
     force: options.ForceOption = False,
 ) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import completion, options
+from mdfconv.cli.options import flag, option
 from mdfconv.cli.tables import write_table
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
@@ -22,16 +23,15 @@ def command(
     source: options.FromOption,
     target: options.ToOption,
     tolerance: Annotated[
-        float,
-        typer.Option(metavar="T", help="Worst relative error against the fit that is accepted."),
+        float, option("T", "Worst relative error against the fit that is accepted.")
     ] = 0.01,
     range_: Annotated[
         str | None,
-        typer.Option(
-            "--range",
-            metavar="LO:HI",
-            help="Values of the source; by default alpha 0.01:0.8, roughness and glossiness "
+        option(
+            "LO:HI",
+            "Values of the source; by default alpha 0.01:0.8, roughness and glossiness "
             "0.1:0.9, exponents 1:10000.",
+            "--range",
         ),
     ] = None,
     metric: options.MetricOption = "environment",
@@ -39,19 +39,10 @@ def command(
     gamma: options.FixedGammaOption = None,
     specular: options.SpecularOption = None,
     language: Annotated[
-        str,
-        typer.Option(
-            "--lang",
-            metavar="LANG",
-            autocompletion=completion.languages,
-            help="glsl, hlsl, c, python or latex.",
-        ),
+        str, option("LANG", "glsl, hlsl, c, python or latex.", "--lang", words=completion.languages)
     ] = "glsl",
     every: Annotated[
-        bool,
-        typer.Option(
-            "--all", help="Print the table of cost against error instead, in that language."
-        ),
+        bool, flag("--all", "Print the table of cost against error instead, in that language.")
     ] = False,
     format_: options.FormatOption = None,
 ) -> None:

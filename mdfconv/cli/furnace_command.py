@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import completion, options
+from mdfconv.cli.options import argument, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 from mdfconv.errors import MdfconvError
@@ -24,44 +25,39 @@ _MOST_DIRECTIONS = 100_000_000
 def command(
     context: typer.Context,
     parameter: Annotated[
-        float,
-        typer.Argument(metavar="PARAMETER", help="Exponent of the Phong BRDFs, α of the others."),
+        float, argument("PARAMETER", "Exponent of the Phong BRDFs, α of the others.")
     ],
     brdf: Annotated[
         str,
-        typer.Option(
-            metavar="BRDF",
-            autocompletion=completion.furnace_brdfs,
-            help="phong, modified-phong, ggx, beckmann, smoothie, smoothie-approx or "
+        option(
+            "BRDF",
+            "phong, modified-phong, ggx, beckmann, smoothie, smoothie-approx or "
             "ashikhmin-shirley; ggx:roughness takes PARAMETER for a stored form of α.",
+            words=completion.furnace_brdfs,
         ),
     ] = "ggx",
     normalizer: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME",
-            autocompletion=completion.normalizers,
-            help="Of modified-phong: usual (the default), arvo (integer exponents) or "
-            "mallett-yuksel.",
+        option(
+            "NAME",
+            "Of modified-phong: usual (the default), arvo (integer exponents) or mallett-yuksel.",
+            words=completion.normalizers,
         ),
     ] = None,
     masking: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "G",
+            "Of ggx and beckmann: correlated (the default), separable, v-cavity, ksk or none.",
             "--g",
-            metavar="G",
-            autocompletion=completion.maskings,
-            help="Of ggx and beckmann: correlated (the default), separable, v-cavity, ksk or none.",
+            words=completion.maskings,
         ),
     ] = None,
-    points: Annotated[
-        int, typer.Option(metavar="N", help="Cosines of the viewer, from 0 to 1.")
-    ] = 21,
+    points: Annotated[int, option("N", "Cosines of the viewer, from 0 to 1.")] = 21,
     samples: Annotated[
-        int | None,
-        typer.Option("--mc", metavar="N", help="Estimate by N random directions a cosine, too."),
+        int | None, option("N", "Estimate by N random directions a cosine, too.", "--mc")
     ] = None,
-    seed: Annotated[int, typer.Option(metavar="S", help="Of the random numbers.")] = 0,
+    seed: Annotated[int, option("S", "Of the random numbers.")] = 0,
     png: options.PngOption = None,
     format_: options.FormatOption = None,
     output: options.OutputOption = None,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mdfconv.cli import completion, material_files, options
+from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
 
@@ -29,27 +30,26 @@ _KEYS = (
 def command(
     context: typer.Context,
     files: Annotated[
-        list[str],
-        typer.Argument(metavar="IN.glb...", help="glTF or GLB files, or patterns such as '*.glb'."),
+        list[str], argument("IN.glb...", "glTF or GLB files, or patterns such as '*.glb'.")
     ],
     output: material_files.ResultOption = None,
     source: Annotated[
         str | None,
-        typer.Option(
-            "--from",
-            metavar="MDF:PROGRAM",
-            autocompletion=completion.endpoints,
-            help="What the program that wrote the file stored, such as blinn-phong:obj2gltf "
+        option(
+            "MDF:PROGRAM",
+            "What the program that wrote the file stored, such as blinn-phong:obj2gltf "
             "(mdfconv list --encodings has all).",
+            "--from",
+            words=completion.endpoints,
         ),
     ] = None,
     target: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "MDF:ENCODING",
+            "What the factors become; if not given ggx:roughness, as glTF defines them.",
             "--to",
-            metavar="MDF:ENCODING",
-            autocompletion=completion.endpoints,
-            help="What the factors become; if not given ggx:roughness, as glTF defines them.",
+            words=completion.endpoints,
         ),
     ] = None,
     metric: options.MetricOption = "environment",
@@ -58,25 +58,16 @@ def command(
     in_place: material_files.InPlaceOption = False,
     force: options.ForceOption = False,
     textures: Annotated[
-        bool,
-        typer.Option(
-            "--textures", help="Convert roughness textures, too, each with the factor before it."
-        ),
+        bool, flag("--textures", "Convert roughness textures, too, each with the factor before it.")
     ] = False,
     lossy: Annotated[
-        bool, typer.Option("--lossy", help="Take JPEG textures, although altered; they become PNG.")
+        bool, flag("--lossy", "Take JPEG textures, although altered; they become PNG.")
     ] = False,
     guess: Annotated[
-        bool,
-        typer.Option(
-            "--guess", help="Only propose --from by the file's asset.generator; write nothing."
-        ),
+        bool, flag("--guess", "Only propose --from by the file's asset.generator; write nothing.")
     ] = False,
     compare: Annotated[
-        bool,
-        typer.Option(
-            "--compare", help="Add what importers' rules make of the exponents, and their error."
-        ),
+        bool, flag("--compare", "Add what importers' rules make of the exponents, and their error.")
     ] = False,
     format_: material_files.ReportFormatOption = material_files.ReportFormat.table,
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption
+from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption, argument, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import console, form_of, write_table
@@ -19,20 +19,12 @@ _ROUGHNESSES = (0.05, 0.1, 0.2, 0.4)
 def command(
     map_: Annotated[
         Path,
-        typer.Argument(
-            metavar="MAP",
-            help="Environment map, linear, 2:1: OpenEXR, Radiance .hdr or another picture.",
-        ),
+        argument("MAP", "Environment map, linear, 2:1: OpenEXR, Radiance .hdr or another picture."),
     ],
     m_b: Annotated[
-        list[float] | None,
-        typer.Option(
-            "--m-b", metavar="M", help="Beckmann's m_B; repeatable; by default 0.05 to 0.4."
-        ),
+        list[float] | None, option("M", "Beckmann's m_B; repeatable; by default 0.05 to 0.4.")
     ] = None,
-    spectrum: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="Write the spectrum as CSV.")
-    ] = None,
+    spectrum: Annotated[Path | None, option("FILE", "Write the spectrum as CSV.", "--csv")] = None,
     png: PngOption = None,
     force: ForceOption = False,
     format_: FormatOption = None,

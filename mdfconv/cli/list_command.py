@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-import typer
-
 from mdfconv.cli import options
+from mdfconv.cli.options import flag
 from mdfconv.cli.tables import console, form_of, print_table, write_table
 from mdfconv.distributions import Distribution, list_distributions
 from mdfconv.distributions.endpoint import forms_of
@@ -26,10 +25,7 @@ _FOOTNOTE = (
 
 def command(
     encodings: Annotated[
-        bool,
-        typer.Option(
-            "--encodings", help="List what follows a colon: how files and programs store it."
-        ),
+        bool, flag("--encodings", "List what follows a colon: how files and programs store it.")
     ] = False,
     metric: options.OptionalMetricOption = None,
     exposure: options.ExposureOption = None,

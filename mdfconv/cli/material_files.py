@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli.options import flag, option
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import ROWS_SHOWN, print_table
 from mdfconv.errors import MdfconvError
@@ -40,15 +41,10 @@ class ReportFormat(StrEnum):
 
 ResultOption = Annotated[
     str | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="OUT",
-        help="File, or a folder: one that exists, or out/ with a slash.",
-    ),
+    option("OUT", "File, or a folder: one that exists, or out/ with a slash.", "--output", "-o"),
 ]
 InPlaceOption = Annotated[
-    bool, typer.Option("--in-place", help="Change the file itself; the original is kept as .bak.")
+    bool, flag("--in-place", "Change the file itself; the original is kept as .bak.")
 ]
 ReportFormatOption = Annotated[
     ReportFormat,

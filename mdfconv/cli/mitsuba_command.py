@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mdfconv.cli import options
 from mdfconv.cli import completion, material_files
-from mdfconv.cli.options import ExposureOption, ForceOption, MetricOption, chosen_metric
+from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.process import tell
 
 if TYPE_CHECKING:
@@ -28,28 +29,23 @@ _KEYS = (
 
 def command(
     context: typer.Context,
-    scenes: Annotated[
-        list[str], typer.Argument(metavar="IN.xml...", help="Scenes, or patterns such as '*.xml'.")
-    ],
+    scenes: Annotated[list[str], argument("IN.xml...", "Scenes, or patterns such as '*.xml'.")],
     output: material_files.ResultOption = None,
     to: Annotated[
         str,
-        typer.Option(
-            metavar="MDF",
-            autocompletion=completion.mitsuba_targets,
-            help="Distribution to convert to: ggx or beckmann.",
+        option(
+            "MDF", "Distribution to convert to: ggx or beckmann.", words=completion.mitsuba_targets
         ),
     ] = "ggx",
-    metric: MetricOption = "environment",
-    exposure: ExposureOption = None,
+    metric: options.MetricOption = "environment",
+    exposure: options.ExposureOption = None,
     in_place: material_files.InPlaceOption = False,
-    force: ForceOption = False,
+    force: options.ForceOption = False,
     textures: Annotated[
-        bool,
-        typer.Option("--textures", help="Convert the bitmaps of alpha, too, beside the result."),
+        bool, flag("--textures", "Convert the bitmaps of alpha, too, beside the result.")
     ] = False,
     compare: Annotated[
-        bool, typer.Option("--compare", help="Add what is left if alpha is kept: its error.")
+        bool, flag("--compare", "Add what is left if alpha is kept: its error.")
     ] = False,
     format_: material_files.ReportFormatOption = material_files.ReportFormat.table,
 ) -> None:
@@ -72,7 +68,7 @@ def command(
     from mdfconv.scene.texture.rule import TextureRule
 
     target = check_target(to)
-    chosen = chosen_metric(metric, exposure)
+    chosen = options.chosen_metric(metric, exposure)
 
     def convert(destination: Destination, data: bytes) -> MitsubaConversion:
         folder = TextureFolder(destination.source, destination.output)

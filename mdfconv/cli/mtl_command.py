@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mdfconv.cli import completion, material_files, options
+from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.tables import progress
 from mdfconv.errors import MdfconvError
 
@@ -24,39 +25,31 @@ _HEADINGS = {
 def command(
     context: typer.Context,
     libraries: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="IN.mtl...", help="Material libraries, or patterns such as '*.mtl'."
-        ),
+        list[str], argument("IN.mtl...", "Material libraries, or patterns such as '*.mtl'.")
     ],
     output: material_files.ResultOption = None,
     to: Annotated[
         str,
-        typer.Option(
-            metavar="WHAT",
-            autocompletion=completion.mtl_targets,
-            help="roughness (Pr from Ns) or shininess (Ns from Pr, the inverse).",
+        option(
+            "WHAT",
+            "roughness (Pr from Ns) or shininess (Ns from Pr, the inverse).",
+            words=completion.mtl_targets,
         ),
     ] = "roughness",
     metric: options.MetricOption = "environment",
     exposure: options.ExposureOption = None,
-    replace: Annotated[
-        bool, typer.Option("--replace", help="Drop the statement that was converted.")
-    ] = False,
+    replace: Annotated[bool, flag("--replace", "Drop the statement that was converted.")] = False,
     in_place: material_files.InPlaceOption = False,
     force: options.ForceOption = False,
     textures: Annotated[
         bool,
-        typer.Option(
-            "--textures", help="Convert the textures of map_Ns, too, into map_Pr beside the result."
-        ),
+        flag("--textures", "Convert the textures of map_Ns, too, into map_Pr beside the result."),
     ] = False,
     exponent_max: Annotated[
-        float, typer.Option(metavar="N", help="Exponent of a white texel in those textures.")
+        float, option("N", "Exponent of a white texel in those textures.")
     ] = 1000.0,
     compare: Annotated[
-        bool,
-        typer.Option("--compare", help="Add what importers' rules make of Ns, and their error."),
+        bool, flag("--compare", "Add what importers' rules make of Ns, and their error.")
     ] = False,
     format_: material_files.ReportFormatOption = material_files.ReportFormat.table,
 ) -> None:

@@ -34,68 +34,70 @@ class Format(StrEnum):
     markdown = "markdown"
 
 
+def option(metavar: str, help_: str, *names: str, words: Any = None, **more: Any) -> Any:
+    """Return a Typer option that takes a value, of which the shell completes some `words`.
+
+    Without names it has that of its parameter.
+    """
+    return typer.Option(*names, metavar=metavar, help=help_, autocompletion=words, **more)
+
+
+def flag(name: str, help_: str) -> Any:
+    """Return a Typer option that takes no value and has no ``--no-`` form."""
+    return typer.Option(name, help=help_)
+
+
+def argument(metavar: str, help_: str, **more: Any) -> Any:
+    """Return a Typer argument."""
+    return typer.Argument(metavar=metavar, help=help_, **more)
+
+
 FromOption = Annotated[
     str,
-    typer.Option(
-        "--from",
-        metavar="MDF",
-        autocompletion=completion.endpoints,
-        help="Distribution that the values belong to, such as beckmann, ggx or blinn-phong; "
+    option(
+        "MDF",
+        "Distribution that the values belong to, such as beckmann, ggx or blinn-phong; "
         "ggx:roughness and ggx:glossiness name stored forms of α, blinn-phong:reflected the older "
         "Phong exponent.",
+        "--from",
+        words=completion.endpoints,
     ),
 ]
 ToOption = Annotated[
     str,
-    typer.Option(
-        "--to",
-        metavar="MDF",
-        autocompletion=completion.targets,
-        help="Distribution to convert to, as for --from.",
-    ),
+    option("MDF", "Distribution to convert to, as for --from.", "--to", words=completion.targets),
 ]
 MethodOption = Annotated[
     str | None,
-    typer.Option(
-        "--method",
-        metavar="METHOD",
-        autocompletion=completion.methods,
-        help="closed-form (keeps the lobe's shape, approximately), half-angle, ward, peak, "
+    option(
+        "METHOD",
+        "closed-form (keeps the lobe's shape, approximately), half-angle, ward, peak, "
         "fit: exact, under the metric, or fast: the same from stored polynomials. With --metric "
         "alone the fit, by fast where that reaches.",
+        words=completion.methods,
     ),
 ]
-_METRIC = typer.Option(
-    "--metric",
-    metavar="METRIC",
-    autocompletion=completion.metrics,
-    help="What a fit keeps, and what errors are taken of: unit (the shape of the lobe), energy "
+_METRIC = option(
+    "METRIC",
+    "What a fit keeps, and what errors are taken of: unit (the shape of the lobe), energy "
     "(the light of the sun or a lamp), environment (the light of a natural environment), "
     "light:FILE (that of an environment map) or display (the picture on a screen).",
+    words=completion.metrics,
 )
 MetricOption = Annotated[str, _METRIC]
 OptionalMetricOption = Annotated[str | None, _METRIC]
 ExposureOption = Annotated[
     float | None,
-    typer.Option(
-        "--exposure",
-        metavar="E",
-        help="Exposure of the display metric; 1, if not given, puts the source's peak at white.",
-    ),
+    option("E", "Exposure of the display metric; 1, if not given, puts the source's peak at white."),
 ]
 _GAMMA_HELP = "Second parameter, of gtr and student-t; 2, which is ggx, if not given"
-GammaOption = Annotated[
-    str | None, typer.Option("--gamma", metavar="G", help=f"{_GAMMA_HELP}; free fits it.")
-]
-FixedGammaOption = Annotated[
-    str | None, typer.Option("--gamma", metavar="G", help=f"{_GAMMA_HELP}.")
-]
+GammaOption = Annotated[str | None, option("G", f"{_GAMMA_HELP}; free fits it.")]
+FixedGammaOption = Annotated[str | None, option("G", f"{_GAMMA_HELP}.")]
 SpecularOption = Annotated[
     float | None,
-    typer.Option(
-        "--specular",
-        metavar="L",
-        help="Weight of the specular lobe or luminance of Ks, above 0 to 1, where a program's rule "
+    option(
+        "L",
+        "Weight of the specular lobe or luminance of Ks, above 0 to 1, where a program's rule "
         "depends on it (mdfconv list --encodings).",
     ),
 ]
@@ -107,38 +109,31 @@ FormatOption = Annotated[
         "most easily, in a file what its name ends in.",
     ),
 ]
-OutputOption = Annotated[
-    Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write to a file instead.")
-]
+OutputOption = Annotated[Path | None, option("FILE", "Write to a file instead.", "--output", "-o")]
 FolderOption = Annotated[
     Path | None,
-    typer.Option(
+    option(
+        "DIR",
+        "Folder to write to, created if it is not there; by default ./reports.",
         "--output",
         "-o",
-        metavar="DIR",
-        help="Folder to write to, created if it is not there; by default ./reports.",
     ),
 ]
 ForceOption = Annotated[
-    bool, typer.Option("--force", help="Write over files that exist; else they are refused.")
+    bool, flag("--force", "Write over files that exist; else they are refused.")
 ]
-PngOption = Annotated[
-    Path | None, typer.Option("--png", metavar="FILE", help="Draw the result into a picture.")
-]
+PngOption = Annotated[Path | None, option("FILE", "Draw the result into a picture.")]
 DpiOption = Annotated[
-    int,
-    typer.Option(
-        "--dpi", metavar="N", min=10, max=_LARGEST_DPI, help="Resolution of pictures, dots an inch."
-    ),
+    int, option("N", "Resolution of pictures, dots an inch.", min=10, max=_LARGEST_DPI)
 ]
 
 
 def refuse_given(context: typer.Context, names: Collection[str], why: str) -> None:
     """Refuse options that would be ignored; `why` follows the option's name in the refusal."""
-    for option in context.command.params:
-        source = context.get_parameter_source(option.name or "")
-        if option.name in names and source is not None and source.name == "COMMANDLINE":
-            raise MdfconvError(f"{option.opts[0]} {why}")
+    for parameter in context.command.params:
+        source = context.get_parameter_source(parameter.name or "")
+        if parameter.name in names and source is not None and source.name == "COMMANDLINE":
+            raise MdfconvError(f"{parameter.opts[0]} {why}")
 
 
 def refuse_idle_metric(context: typer.Context, method: str | None) -> None:

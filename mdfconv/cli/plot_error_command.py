@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mdfconv.cli import completion, options
+from mdfconv.cli.options import flag, option
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
 from mdfconv.cli.tables import write_table
 from mdfconv.distributions import one_parameter_distribution
@@ -24,37 +25,34 @@ _COLUMNS = ("figure", "distribution", "parameter", "max_error_percent", "beta_ra
 def command(
     context: typer.Context,
     m_b: Annotated[
-        list[float] | None,
-        typer.Option("--m-b", metavar="M", help="Beckmann's m_B; repeatable; default the paper's."),
+        list[float] | None, option("M", "Beckmann's m_B; repeatable; default the paper's.")
     ] = None,
     method: options.MethodOption = None,
     metric: options.OptionalMetricOption = None,
     exposure: options.ExposureOption = None,
     reference: Annotated[
         str,
-        typer.Option(
-            metavar="MDF",
-            autocompletion=completion.distributions,
-            help="Distribution that the errors are taken against.",
+        option(
+            "MDF", "Distribution that the errors are taken against.", words=completion.distributions
         ),
     ] = _REFERENCE,
     mdf: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="MDF",
-            autocompletion=completion.endpoints,
-            help="Only this distribution, or the form in which its parameter is printed, such as "
+        option(
+            "MDF",
+            "Only this distribution, or the form in which its parameter is printed, such as "
             "ggx:roughness; repeatable.",
+            words=completion.endpoints,
         ),
     ] = None,
     output: options.FolderOption = None,
     force: options.ForceOption = False,
     png: Annotated[bool, typer.Option("--png/--no-png", help="Write pictures.")] = True,
     csv: Annotated[bool, typer.Option("--csv/--no-csv", help="Write the errors.")] = True,
-    svg: Annotated[bool, typer.Option("--svg", help="Write pictures as SVG, too.")] = False,
+    svg: Annotated[bool, flag("--svg", "Write pictures as SVG, too.")] = False,
     dpi: options.DpiOption = 150,
-    points: Annotated[int, typer.Option(metavar="N", help="Angles a curve.")] = 1001,
-    log: Annotated[bool, typer.Option("--log", help="Logarithmic, for the tails.")] = False,
+    points: Annotated[int, option("N", "Angles a curve.")] = 1001,
+    log: Annotated[bool, flag("--log", "Logarithmic, for the tails.")] = False,
     format_: options.FormatOption = None,
 ) -> None:
     """Draw distributions and their error: Figures 1 and 2 of Sawicki 2021.

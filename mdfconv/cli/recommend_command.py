@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mdfconv.cli import options
+from mdfconv.cli.options import argument, option
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import console, form_of, print_table, table_text, value_text
 from mdfconv.output.records import json_text
@@ -26,14 +27,11 @@ _HEADINGS = {
 
 
 def command(
-    value: Annotated[float, typer.Argument(metavar="VALUE", help="Parameter of the surface.")],
+    value: Annotated[float, argument("VALUE", "Parameter of the surface.")],
     source: options.FromOption,
     tolerance: Annotated[
         float,
-        typer.Option(
-            metavar="T",
-            help="Largest maximum error allowed under the metric, relative to the source's.",
-        ),
+        option("T", "Largest maximum error allowed under the metric, relative to the source's."),
     ] = 0.05,
     metric: options.MetricOption = "environment",
     exposure: options.ExposureOption = None,

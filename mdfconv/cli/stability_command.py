@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.options import ForceOption, FormatOption, OutputOption
+from mdfconv.cli.options import ForceOption, FormatOption, OutputOption, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 
@@ -29,11 +29,7 @@ def command(
     force: ForceOption = False,
     mdf: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="MDF",
-            autocompletion=completion.distributions,
-            help="Only this distribution; repeatable.",
-        ),
+        option("MDF", "Only this distribution; repeatable.", words=completion.distributions),
     ] = None,
     part: Annotated[Part | None, typer.Option(help="Only this part.")] = None,
 ) -> None:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from enum import StrEnum
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -37,21 +36,10 @@ _REFERENCE = "beckmann"
 _ON_PAGE = "ggx"
 
 
-class LightName(StrEnum):
-    """The lights of the scene."""
-
-    directional = "directional"
-    area = "area"
-
-
-class Brdf(StrEnum):
-    """The BRDFs into which a distribution can be put."""
-
-    ashikhmin_shirley = "ashikhmin-shirley"
-    cook_torrance = "cook-torrance"
-    smoothie = "smoothie"
-    smoothie_approx = "smoothie-approx"
-    modified_phong = "modified-phong"
+# The BRDFs into which a distribution can be put.
+_Brdf = Literal[
+    "ashikhmin-shirley", "cook-torrance", "smoothie", "smoothie-approx", "modified-phong"
+]
 
 
 def command(
@@ -82,12 +70,10 @@ def command(
         float,
         option("E", "Exposure: 1 displays the source's peak, or its brightest channel, as white."),
     ] = 1.0,
-    light: Annotated[LightName, typer.Option(help="A directional light or a square one.")] = (
-        LightName.directional
-    ),
+    light: Annotated[Literal["directional", "area"], typer.Option(help="A directional light or a square one.")] = "directional",
     brdf: Annotated[
-        Brdf, typer.Option(help="The BRDF into which the distribution is put.")
-    ] = Brdf.ashikhmin_shirley,
+        _Brdf, typer.Option(help="The BRDF into which the distribution is put.")
+    ] = "ashikhmin-shirley",
     material: Annotated[
         str | None,
         option(
@@ -165,7 +151,7 @@ def command(
     surfaces = _surfaces(end, values)
     if _asks_for_all(names):
         ends = _answering(surfaces.values(), rules, end, ends)
-    scene = Scene(brdf.value, light.value, normalized, exposure, size, material)
+    scene = Scene(brdf, light, normalized, exposure, size, material)
     words = _words(scene, rules, names)
     figures = {_file_name([start, *words]): value for start, value in surfaces.items()}
     folder = check_folder(context, output)

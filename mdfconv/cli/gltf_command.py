@@ -69,7 +69,7 @@ def command(
     compare: Annotated[
         bool, flag("--compare", "Add what importers' rules make of the exponents, and their error.")
     ] = False,
-    format_: material_files.ReportFormatOption = material_files.ReportFormat.table,
+    format_: material_files.ReportFormatOption = "table",
 ) -> None:
     """Repair the roughness factors of glTF 2.0 files whose writer had exponents.
 

@@ -7,10 +7,9 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from enum import StrEnum
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -32,13 +31,8 @@ MATERIALS_SHOWN = 100
 _JSON = "--format json"
 
 
-class ReportFormat(StrEnum):
-    """The forms of the report on what was converted."""
-
-    table = "table"
-    json = "json"
-
-
+# The forms of the report on what was converted.
+ReportFormat = Literal["table", "json"]
 ResultOption = Annotated[
     str | None,
     option("OUT", "File, or a folder: one that exists, or out/ with a slash.", "--output", "-o"),
@@ -98,7 +92,7 @@ class MaterialReport:
 
     def print(self, converted: Sequence[tuple[Destination, FileConversion]]) -> None:
         """Print JSON of all to standard output, or tables to standard error."""
-        if self.form is ReportFormat.json:
+        if self.form == "json":
             typer.echo(json_text([self._record(*file) for file in converted]))
             return
         for destination, conversion in converted:
@@ -111,7 +105,7 @@ class MaterialReport:
     def _record(self, destination: Destination, conversion: FileConversion) -> dict[str, Any]:
         """Return what is said of a file: of all materials, or of those that a table shows."""
         shown = conversion.materials
-        if self.form is ReportFormat.table:
+        if self.form == "table":
             shown = shown[:MATERIALS_SHOWN]
         rows = [vars(material) | {"notes": list(material.notes)} for material in shown]
         if self.compare:
@@ -141,7 +135,7 @@ class MaterialReport:
         for row in rows:
             row["importers"] = {}
         known = [row for row in rows if math.isfinite(row[self.exponent])]
-        if self.form is ReportFormat.table:
+        if self.form == "table":
             known = known[: ROWS_SHOWN // len(IMPORTERS)]
         exponents = np.array([row[self.exponent] for row in known])
         for row, results in zip(known, importer_results(exponents, self.metric), strict=True):

@@ -47,7 +47,7 @@ def command(
     compare: Annotated[
         bool, flag("--compare", "Add what is left if alpha is kept: its error.")
     ] = False,
-    format_: material_files.ReportFormatOption = material_files.ReportFormat.table,
+    format_: material_files.ReportFormatOption = "table",
 ) -> None:
     """Convert the distribution of rough BSDFs in Mitsuba scenes (0.6 and 3).
 

@@ -51,7 +51,7 @@ def command(
     compare: Annotated[
         bool, flag("--compare", "Add what importers' rules make of Ns, and their error.")
     ] = False,
-    format_: material_files.ReportFormatOption = material_files.ReportFormat.table,
+    format_: material_files.ReportFormatOption = "table",
 ) -> None:
     """Convert the shininess of Wavefront material libraries to roughness, or back.
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -16,13 +15,6 @@ from mdfconv.cli.tables import write_table
 _SECONDARY = ("textbook", "worst", "error_in_eps", "cases", "out_of_range")
 
 
-class Part(StrEnum):
-    """The parts of the audit."""
-
-    kernels = "kernels"
-    conversions = "conversions"
-
-
 def command(
     format_: FormatOption = None,
     output: OutputOption = None,
@@ -31,7 +23,7 @@ def command(
         list[str] | None,
         option("MDF", "Only this distribution; repeatable.", words=completion.distributions),
     ] = None,
-    part: Annotated[Part | None, typer.Option(help="Only this part.")] = None,
+    part: Annotated[Literal["kernels", "conversions"] | None, typer.Option(help="Only this part.")] = None,
 ) -> None:
     """Audit the hard cases: errors against 50-digit values, beside those of the printed formulas.
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -13,14 +12,6 @@ from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import progress
-
-
-class Depth(StrEnum):
-    """Bits of the result."""
-
-    keep = "keep"
-    eight = "8"
-    sixteen = "16"
 
 
 def command(
@@ -58,7 +49,7 @@ def command(
         float, option("N", "Exponent of the brightest texel, for exponent.")
     ] = 1000.0,
     log2_scale: Annotated[float, option("K", "k of log2; 13 is for exponents up to 8192.")] = 13.0,
-    depth: Annotated[Depth, typer.Option(help="Bits of the result.")] = Depth.keep,
+    depth: Annotated[Literal["keep", "8", "16"], typer.Option(help="Bits of the result.")] = "keep",
     dither: Annotated[bool, flag("--dither", "Diffuse the errors of rounding to 8 bits.")] = False,
     lossy: Annotated[
         bool, flag("--lossy", "Take a JPEG, although it has altered the values.")
@@ -108,7 +99,7 @@ def command(
             output,
             rule,
             channel=channel,
-            depth=None if depth is Depth.keep else int(depth),
+            depth=None if depth == "keep" else int(depth),
             dither=dither,
             lossy=lossy,
             max_pixels=max_pixels,

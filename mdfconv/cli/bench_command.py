@@ -69,6 +69,7 @@ def command(
 
     mdfconv bench --format markdown --png speed-error.png > speed-error.md
     """
+    from mdfconv.studies import bench_page
     from mdfconv.studies.bench import measure
 
     outputs = Outputs(csv, json, png, force=force)
@@ -81,11 +82,18 @@ def command(
     if json:
         contents[json] = file_bytes(_json(measurements))
     if png:
-        from mdfconv.studies.bench_page import draw
-
-        contents[png] = draw(measurements)
+        contents[png] = bench_page.draw(measurements)
     outputs.write(contents)
-    _print(measurements, form_of(format_), png)
+    form = form_of(format_)
+    if form is options.Format.csv:
+        typer.echo(_csv(measurements))
+    elif form is options.Format.json:
+        typer.echo(_json(measurements))
+    elif form is options.Format.markdown:
+        typer.echo(bench_page.markdown_page(measurements, png.name if png else None))
+    else:
+        for name, rows in bench_page.tables(measurements).items():
+            write_table(list(rows[0]), rows, form, title=bench_page.title(measurements, name))
 
 
 def _task(
@@ -112,20 +120,6 @@ def _task(
         target=one_parameter_distribution(target),
         sizes=QUICK if quick else FULL,
     )
-
-
-def _print(measurements: Measurements, form: options.Format, png: Path | None) -> None:
-    from mdfconv.studies import bench_page
-
-    if form is options.Format.csv:
-        typer.echo(_csv(measurements))
-    elif form is options.Format.json:
-        typer.echo(_json(measurements))
-    elif form is options.Format.markdown:
-        typer.echo(bench_page.markdown_page(measurements, png.name if png else None))
-    else:
-        for name, rows in bench_page.tables(measurements).items():
-            write_table(list(rows[0]), rows, form, title=bench_page.title(measurements, name))
 
 
 def _csv(measurements: Measurements) -> str:

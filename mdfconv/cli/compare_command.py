@@ -47,9 +47,7 @@ def command(
     values: Annotated[
         list[float] | None,
         argument(
-            "[VALUE]...",
-            "Parameters of the source; of beckmann 0.4 and 0.04464 if not given.",
-            show_default=False,
+            "[VALUE]...", "Parameters of the source; of beckmann 0.4 and 0.04464 if not given."
         ),
     ] = None,
     source: options.FromOption = _REFERENCE,
@@ -70,7 +68,9 @@ def command(
         float,
         option("E", "Exposure: 1 displays the source's peak, or its brightest channel, as white."),
     ] = 1.0,
-    light: Annotated[Literal["directional", "area"], typer.Option(help="A directional light or a square one.")] = "directional",
+    light: Annotated[
+        Literal["directional", "area"], typer.Option(help="A directional light or a square one.")
+    ] = "directional",
     brdf: Annotated[
         _Brdf, typer.Option(help="The BRDF into which the distribution is put.")
     ] = "ashikhmin-shirley",

@@ -87,9 +87,9 @@ def command(
     numbers = [number for block in read_blocks(values) for number in block.numbers]
     groups: list[list[Conversion]] = []
     refusals: list[MdfconvError] = []
+    errors = form is not options.Format.plain
     for name in _targets(numbers, source) if every else [target]:
         own = fixed_or_free if not every or _takes_gamma(source, name, free=free) else None
-        errors = form is not options.Format.plain
         try:
             groups.append(
                 explain(numbers, source, name, method, metric=asked, gamma=own, errors=errors)
@@ -100,13 +100,14 @@ def command(
         raise refusals[0]
     for refusal in refusals:
         tell(f"left out: {refusal}")
+    conversions = [conversion for group in groups for conversion in group]
     if form is options.Format.plain:
-        _write_plain(groups, named=every, free=free)
+        _write_plain(conversions, named=every, free=free)
     elif form is options.Format.table:
         for group in groups:
             _print_group(group, fixed_or_free, exposure)
     else:
-        records = [_record(conversion) for group in groups for conversion in group]
+        records = [_record(conversion) for conversion in conversions]
         columns = [name for name in records[0] if any(r[name] is not None for r in records)]
         typer.echo(tables.table_text(columns, records, form))
 
@@ -246,9 +247,8 @@ def _tell_new(cautions: Iterable[str], told: set[str]) -> None:
             told.add(caution)
 
 
-def _write_plain(groups: list[list[Conversion]], *, named: bool, free: bool) -> None:
+def _write_plain(conversions: list[Conversion], *, named: bool, free: bool) -> None:
     """Write the bare results, behind their names where there are several targets."""
-    conversions = [conversion for group in groups for conversion in group]
     _tell_new((text for conversion in conversions for text in conversion.cautions), set())
     lines = []
     for conversion in conversions:
@@ -267,12 +267,13 @@ def _print_group(group: list[Conversion], gamma: Gamma, exposure: float | None) 
     rows: list[dict[str, Any]] = []
     styles: list[str] = []
     for conversion in group[: tables.ROWS_SHOWN]:
-        rows.append(_row(conversion, headings))
-        styles.append("bold")
-        if len(group) <= _VALUES_WITH_ALTERNATIVES and not conversion.exact:
-            others = _by_other_methods(conversion, gamma)
-            rows += [_row(other, headings, first=False) for other in others]
-            styles += ["dim"] * len(others)
+        few = len(group) <= _VALUES_WITH_ALTERNATIVES and not conversion.exact
+        others = _by_other_methods(conversion, gamma) if few else []
+        rows += [
+            _row(conversion, headings),
+            *(_row(other, headings, first=False) for other in others),
+        ]
+        styles += ["bold", *["dim"] * len(others)]
     title = f"{' → '.join(headings[:2])}, {group[0].metric}"
     tables.print_table(list(rows[0]), rows, title, styles, count=len(group))
     for caution in dict.fromkeys(text for conversion in group for text in conversion.cautions):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -11,9 +11,6 @@ from mdfconv.cli.options import flag, option
 from mdfconv.cli.tables import write_table
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
-
-if TYPE_CHECKING:
-    from mdfconv.formula import SearchProblem
 
 _COLUMNS = ("operations", "worst_error", "formula")
 
@@ -63,7 +60,7 @@ def command(
     mdfconv formula --from blinn-phong --to ggx --metric energy --all --lang latex
     """
     from mdfconv.distributions.endpoint import endpoints, with_specular
-    from mdfconv.formula import LANGUAGES, SearchProblem, cheapest, write_formula
+    from mdfconv.formula import LANGUAGES, SearchProblem, cheapest, pareto_front, write_formula
 
     if every:
         options.refuse_given(
@@ -73,14 +70,22 @@ def command(
         options.refuse_given(
             context, ["format_"], "is the form of the table of --all: a formula has --lang"
         )
-    LANGUAGES[language]  # names are wrong more often than ranges
+    chosen_language = LANGUAGES[language]  # names are wrong more often than ranges
     first, last = endpoints(*with_specular(source, target, specular), options.fixed_gamma(gamma))
     ends = options.noted(first), options.noted(last)
     low, high = ends[0].stored.typical if range_ is None else _range(range_)
     problem = SearchProblem(*ends, options.chosen_metric(metric, exposure), low, high)
     if every:
         title = f"Formulas from {ends[0].label} to {ends[1].label}, {low:g} to {high:g}"
-        write_table(_COLUMNS, _rows(problem, language), format_, title=title)
+        rows = [
+            {
+                "operations": formula.shape.operations,
+                "worst_error": float(f"{formula.error:.3g}"),
+                "formula": chosen_language.one_line(formula, problem),
+            }
+            for formula in pareto_front(problem)
+        ]
+        write_table(_COLUMNS, rows, format_, title=title)
     else:
         typer.echo(write_formula(cheapest(problem, tolerance), problem, language))
 
@@ -94,16 +99,3 @@ def _range(text: str) -> tuple[float, float]:
     if not colon:
         raise MdfconvError(f"--range is LO:HI, two numbers, not '{text}'", percent_hint(text, ":"))
     return ends
-
-
-def _rows(problem: SearchProblem, language: str) -> list[dict[str, Any]]:
-    from mdfconv.formula import LANGUAGES, pareto_front
-
-    return [
-        {
-            "operations": formula.shape.operations,
-            "worst_error": float(f"{formula.error:.3g}"),
-            "formula": LANGUAGES[language].one_line(formula, problem),
-        }
-        for formula in pareto_front(problem)
-    ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -11,10 +11,6 @@ from mdfconv.cli.options import argument, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 from mdfconv.errors import MdfconvError
-
-if TYPE_CHECKING:
-    from mdfconv.distributions.evaluation import Array
-    from mdfconv.studies.furnace import FurnaceModel
 
 _MOST_POINTS = 1001
 _MOST_SAMPLES = 10_000_000
@@ -79,7 +75,8 @@ def command(
     """
     import numpy as np
 
-    from mdfconv.studies.furnace import furnace_model
+    from mdfconv.output.records import rounded_rows
+    from mdfconv.studies import furnace
 
     if samples is None:
         options.refuse_given(context, ["seed"], "goes with --mc")
@@ -95,8 +92,14 @@ def command(
         raise MdfconvError(f"--seed is at least 0, not {seed}")
     outputs = Outputs(png, table=output, force=force)
     name, decoded = _decoded(brdf, parameter)
-    model = furnace_model(name, decoded, normalizer=normalizer, masking=masking)
-    rows = _rows(model, np.linspace(0, 1, points), samples, seed)
+    model = furnace.furnace_model(name, decoded, normalizer=normalizer, masking=masking)
+    cosine = np.linspace(0, 1, points)
+    columns = {"cos_theta": cosine, "albedo": furnace.directional_albedo(model, cosine)}
+    if samples:
+        columns["sampled"], columns["standard_error"] = furnace.sampled_albedo(
+            model, cosine, samples, seed
+        )
+    rows = rounded_rows(columns)
     label = f"{brdf} {parameter:g}"
     picture = {}
     if png:
@@ -120,15 +123,3 @@ def _decoded(brdf: str, value: float) -> tuple[str, float]:
     if not owner:
         raise MdfconvError(f"the exponent of {name} has no stored form", f"did you mean {name}?")
     return name, endpoint(f"{owner}:{form}").decode_one(value)
-
-
-def _rows(
-    model: FurnaceModel, cosine: Array, samples: int | None, seed: int
-) -> list[dict[str, Any]]:
-    from mdfconv.output.records import rounded_rows
-    from mdfconv.studies.furnace import directional_albedo, sampled_albedo
-
-    columns = {"cos_theta": cosine, "albedo": directional_albedo(model, cosine)}
-    if samples:
-        columns["sampled"], columns["standard_error"] = sampled_albedo(model, cosine, samples, seed)
-    return rounded_rows(columns)

@@ -22,9 +22,6 @@ _HEADINGS = {
     "index": "#", "name": "material", "value": "was", "result": "is", "rmse": "RMSE",
     "notes": "notes",
 }  # fmt: skip
-_KEYS = (
-    "file", "output", "from", "to", "metric", "count", "materials", "textures", "problems",
-)  # fmt: skip
 
 
 def command(
@@ -128,10 +125,10 @@ def command(
     report = material_files.MaterialReport(
         form=format_,
         metric=chosen,
-        keys=_KEYS,
         details=lambda conversion: {
             "from": names[0],
             "to": names[1],
+            "count": len(conversion.materials),
             "textures": list(map(str, conversion.files)),
         },
         headings=_HEADINGS,

@@ -29,6 +29,11 @@ Rows = list[dict[str, Any]]
 # Two milliseconds a row: of a hundred thousand materials the report is not to take the time.
 MATERIALS_SHOWN = 100
 _JSON = "--format json"
+# What JSON has of a file, in this order.
+_KEYS = (
+    "file", "output", "from", "to", "target", "metric", "count", "materials", "textures",
+    "includes", "problems", "notes",
+)  # fmt: skip
 
 
 # The forms of the report on what was converted.
@@ -56,11 +61,8 @@ class MaterialReport:
         A table, or JSON.
     metric : Metric
         What the conversions keep.
-    keys : sequence of str
-        What JSON has of a file, in order: of ``file``, ``output``, ``metric``, ``count``,
-        ``materials``, ``problems``, ``notes``, and of the details.
     details : callable
-        From a conversion to what only this command has of it, by key.
+        From a conversion to what not every command has of it, by key.
     headings : mapping of str to str
         The fields of a material that the table shows, where there are such, and their headings.
     secondary : sequence of str
@@ -80,7 +82,6 @@ class MaterialReport:
 
     form: ReportFormat
     metric: Metric
-    keys: Sequence[str]
     details: Callable[[Any], dict[str, Any]]
     headings: Mapping[str, str]
     secondary: Sequence[str] = ()
@@ -116,15 +117,13 @@ class MaterialReport:
             "file": str(destination.source),
             "output": str(destination.output),
             "metric": str(self.metric),
-            "count": len(conversion.materials),
             "materials": rows,
             "problems": [
                 {self.place: problem.place, "problem": self.problem_text(problem)}
                 for problem in conversion.problems
             ],
-            "notes": [{"line": line, "note": text} for line, text in conversion.notes],
         } | self.details(conversion)
-        return {key: known[key] for key in self.keys}
+        return {key: known[key] for key in _KEYS if key in known}
 
     def _add_importers(self, rows: Rows) -> None:
         """Add what importers make of the exponents, to all rows or to those that are shown."""

@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Sequence
+from typing import Annotated, Any
 
 import typer
 
-from mdfconv.cli import options
-from mdfconv.cli import completion, material_files
+from mdfconv.cli import completion, material_files, options
 from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.process import tell
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from mdfconv.scene.material_files import Destination
-    from mdfconv.scene.mitsuba.convert import MitsubaConversion, MitsubaMaterial
 
 _HEADINGS = {
     "name": "BSDF", "line": "line", "distribution": "from", "value": "α", "result": "new α",
     "rmse": "RMSE", "rmse_unchanged": "kept", "notes": "notes",
 }  # fmt: skip
-_KEYS = (
-    "file", "output", "target", "metric", "materials", "textures", "includes", "problems",
-)  # fmt: skip
 
 
 def command(
@@ -63,14 +54,14 @@ def command(
 
     mdfconv mitsuba scene.xml -o out --textures --compare --format json
     """
-    from mdfconv.scene.material_files import TextureFolder
-    from mdfconv.scene.mitsuba.convert import check_target, convert_mitsuba, unchanged_errors
+    from mdfconv.scene.material_files import Destination, TextureFolder
+    from mdfconv.scene.mitsuba import convert as mitsuba
     from mdfconv.scene.texture.rule import TextureRule
 
-    target = check_target(to)
+    target = mitsuba.check_target(to)
     chosen = options.chosen_metric(metric, exposure)
 
-    def convert(destination: Destination, data: bytes) -> MitsubaConversion:
+    def convert(destination: Destination, data: bytes) -> mitsuba.MitsubaConversion:
         folder = TextureFolder(destination.source, destination.output)
 
         def texture(file: str, distribution: str) -> str:
@@ -79,7 +70,7 @@ def command(
             )
 
         with material_files.about(destination.source):
-            conversion = convert_mitsuba(
+            conversion = mitsuba.convert_mitsuba(
                 data, target, metric=chosen, texture=texture if textures else None
             )
         # A texture whose BSDF is left for another reason is not written.
@@ -88,16 +79,15 @@ def command(
         return dataclasses.replace(conversion, files=files, inputs=folder.inputs)
 
     def add_unchanged_errors(
-        materials: Sequence[MitsubaMaterial], rows: material_files.Rows
+        materials: Sequence[mitsuba.MitsubaMaterial], rows: material_files.Rows
     ) -> None:
-        errors = unchanged_errors(materials, target, chosen)
+        errors = mitsuba.unchanged_errors(materials, target, chosen)
         for row, error in zip(rows, errors, strict=True):
             row["rmse_unchanged"] = error
 
     report = material_files.MaterialReport(
         form=format_,
         metric=chosen,
-        keys=_KEYS,
         details=lambda conversion: {
             "target": target,
             "textures": list(map(vars, conversion.textures)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -11,11 +11,6 @@ from mdfconv.cli import completion, material_files, options
 from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.tables import progress
 from mdfconv.errors import MdfconvError
-
-if TYPE_CHECKING:
-    from mdfconv.scene.material_files import Destination
-    from mdfconv.scene.mtl.library import MtlConversion
-    from mdfconv.scene.stored import MaterialProblem
 
 _HEADINGS = {
     "name": "material", "shininess": "Ns", "roughness": "Pr", "rmse": "RMSE", "notes": "notes",
@@ -69,9 +64,9 @@ def command(
 
     mdfconv mtl --to shininess chair-pbr.mtl -o chair-phong.mtl
     """
-    from mdfconv.scene.material_files import TextureFolder
-    from mdfconv.scene.mtl.library import convert_library_textures, convert_mtl, texture_rule
-    from mdfconv.scene.stored import ProblemKind
+    from mdfconv.scene.material_files import Destination, TextureFolder
+    from mdfconv.scene.mtl import library
+    from mdfconv.scene.stored import MaterialProblem, ProblemKind
 
     to = to.strip().lower()
     if to != "roughness" and (compare or textures):
@@ -80,16 +75,18 @@ def command(
         options.refuse_given(context, ["exponent_max"], "goes with --textures")
     chosen = options.chosen_metric(metric, exposure)
     # A mistake in it is none of a library.
-    rule = texture_rule(chosen, exponent_max)
+    rule = library.texture_rule(chosen, exponent_max)
 
-    def convert(destination: Destination, data: bytes) -> MtlConversion:
+    def convert(destination: Destination, data: bytes) -> library.MtlConversion:
         folder = TextureFolder(destination.source, destination.output)
         names: dict[str, str] | None = None
         problems: list[MaterialProblem] = []
         if textures:
-            names, problems = convert_library_textures(data, folder, rule, progress)
+            names, problems = library.convert_library_textures(data, folder, rule, progress)
         with material_files.about(destination.source):
-            conversion = convert_mtl(data, to, metric=chosen, replace=replace, texture_names=names)
+            conversion = library.convert_mtl(
+                data, to, metric=chosen, replace=replace, texture_names=names
+            )
         return dataclasses.replace(
             conversion,
             files=folder.files,
@@ -100,8 +97,10 @@ def command(
     report = material_files.MaterialReport(
         form=format_,
         metric=chosen,
-        keys=["file", "output", "metric", "materials", "textures", "problems", "notes"],
-        details=lambda conversion: {"textures": list(map(vars, conversion.textures))},
+        details=lambda conversion: {
+            "textures": list(map(vars, conversion.textures)),
+            "notes": [{"line": line, "note": text} for line, text in conversion.notes],
+        },
         headings=_HEADINGS,
         remedies={ProblemKind.TEXTURE: ": --textures converts it"},
         exponent="shininess" if compare else "",

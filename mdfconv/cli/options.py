@@ -88,7 +88,9 @@ MetricOption = Annotated[str, _METRIC]
 OptionalMetricOption = Annotated[str | None, _METRIC]
 ExposureOption = Annotated[
     float | None,
-    option("E", "Exposure of the display metric; 1, if not given, puts the source's peak at white."),
+    option(
+        "E", "Exposure of the display metric; 1, if not given, puts the source's peak at white."
+    ),
 ]
 _GAMMA_HELP = "Second parameter, of gtr and student-t; 2, which is ggx, if not given"
 GammaOption = Annotated[str | None, option("G", f"{_GAMMA_HELP}; free fits it.")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -11,9 +11,6 @@ from mdfconv.cli.options import argument, option
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import console, form_of, print_table, table_text, value_text
 from mdfconv.output.records import json_text
-
-if TYPE_CHECKING:
-    from mdfconv.recommend import Recommendation
 
 _FOOTNOTE = (
     "[dim]Errors: root mean square and maximum under the metric, relative to the source's. "
@@ -62,37 +59,27 @@ def command(
     recommendation = recommend(
         end.distribution, end.decode_one(value), one_parameter_distributions(), kept, tolerance
     )
-    asked = {"from": end.label, "value": value, "metric": str(kept), "tolerance": tolerance}
-    _write(recommendation, asked, form_of(format_, in_pipe=options.Format.plain))
-
-
-def _write(recommendation: Recommendation, asked: dict[str, Any], form: options.Format) -> None:
     rows, reason = recommendation.records(), recommendation.reason
     columns, answers = list(rows[0]), recommendation.chosen
     sentence = reason[0].upper() + reason[1:]
+    form = form_of(format_, in_pipe=options.Format.plain)
     if form is options.Format.json:
+        asked = {"from": end.label, "value": value, "metric": str(kept), "tolerance": tolerance}
         chosen = {use: vars(candidate) for use, candidate in answers.items()}
         typer.echo(json_text(asked | chosen | {"reason": reason, "candidates": rows}))
     elif form is options.Format.markdown:
         typer.echo(f"{table_text(columns, rows, form)}\n\n{sentence}")
     elif form is options.Format.table:
-        out = console()
-        _print_table(rows, asked)
-        out.print(sentence)
-        out.print(_FOOTNOTE)
+        shown = [{heading: row[key] for key, heading in _HEADINGS.items()} for row in rows]
+        styles = ["bold" if row["chosen"] else "" if row["within"] else "dim" for row in rows]
+        title = f"{end.label} {value:g} within {tolerance:g}, {kept}"
+        print_table(list(shown[0]), shown, title, styles, secondary=("RMSE", "within"))
+        console().print(f"{sentence}\n{_FOOTNOTE}")
     else:
         lines = [
             f"{use} {answer.distribution} {value_text(answer.parameter)} {answer.method}"
             for use, answer in answers.items()
         ]
-        typer.echo(
-            "\n".join(lines) if form is options.Format.plain else table_text(columns, rows, form)
-        )
+        plain = form is options.Format.plain
+        typer.echo("\n".join(lines) if plain else table_text(columns, rows, form))
         tell(reason)
-
-
-def _print_table(rows: list[dict[str, Any]], asked: dict[str, Any]) -> None:
-    title = f"{asked['from']} {asked['value']:g} within {asked['tolerance']:g}, {asked['metric']}"
-    shown = [{heading: row[key] for key, heading in _HEADINGS.items()} for row in rows]
-    styles = ["bold" if row["chosen"] else "" if row["within"] else "dim" for row in rows]
-    print_table(list(shown[0]), shown, title, styles, secondary=("RMSE", "within"))

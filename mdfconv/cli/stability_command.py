@@ -23,7 +23,9 @@ def command(
         list[str] | None,
         option("MDF", "Only this distribution; repeatable.", words=completion.distributions),
     ] = None,
-    part: Annotated[Literal["kernels", "conversions"] | None, typer.Option(help="Only this part.")] = None,
+    part: Annotated[
+        Literal["kernels", "conversions"] | None, typer.Option(help="Only this part.")
+    ] = None,
 ) -> None:
     """Audit the hard cases: errors against 50-digit values, beside those of the printed formulas.
 

@@ -135,7 +135,6 @@ def main() -> None:
     sys.exit(run(_answer))
 
 
+@whole_words()
 def _answer() -> int | None:
-    with whole_words():
-        status: int | None = typer.main.get_command(app).main(standalone_mode=False)
-    return status
+    return typer.main.get_command(app).main(standalone_mode=False)

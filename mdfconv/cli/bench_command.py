@@ -85,11 +85,11 @@ def command(
         contents[png] = bench_page.draw(measurements)
     outputs.write(contents)
     form = form_of(format_)
-    if form is options.Format.csv:
+    if form == "csv":
         typer.echo(_csv(measurements))
-    elif form is options.Format.json:
+    elif form == "json":
         typer.echo(_json(measurements))
-    elif form is options.Format.markdown:
+    elif form == "markdown":
         typer.echo(bench_page.markdown_page(measurements, png.name if png else None))
     else:
         for name, rows in bench_page.tables(measurements).items():
@@ -127,7 +127,7 @@ def _csv(measurements: Measurements) -> str:
     columns = dict.fromkeys(name for rows in tables.values() for row in rows for name in row)
     blank = dict.fromkeys(columns)
     rows = [{"table": name} | blank | row for name, table in tables.items() for row in table]
-    return table_text(["table", *columns], rows, options.Format.csv)
+    return table_text(["table", *columns], rows, "csv")
 
 
 def _json(measurements: Measurements) -> str:

@@ -165,7 +165,7 @@ def command(
         contents[folder / f"{name}.png"] = draw_comparison(comparison, dpi)
     outputs.write(contents)
     form = form_of(format_)
-    if form is options.Format.table:
+    if form == "table":
         # People read parameters with their symbols.
         texts = {target.label: target.text for target in ends}
         for row in rows:

@@ -77,17 +77,17 @@ def command(
 
     seq 0.1 0.1 0.4 | mdfconv convert --from ggx --to beckmann --method half-angle -
     """
-    form = tables.form_of(format_, in_pipe=options.Format.plain)
+    form = tables.form_of(format_, in_pipe="plain")
     asked, fixed_or_free = options.asked_metric(metric, exposure), options.chosen_gamma(gamma)
     every, free = target.strip().lower() == ALL, fixed_or_free == FREE
     source, target = with_specular(source, source if every else target, specular)
-    if form is options.Format.plain and not every and not free:
+    if form == "plain" and not every and not free:
         _stream(read_blocks(values), ConversionRule(source, target, method, asked, fixed_or_free))
         return
     numbers = [number for block in read_blocks(values) for number in block.numbers]
     groups: list[list[Conversion]] = []
     refusals: list[MdfconvError] = []
-    errors = form is not options.Format.plain
+    errors = form != "plain"
     for name in _targets(numbers, source) if every else [target]:
         own = fixed_or_free if not every or _takes_gamma(source, name, free=free) else None
         try:
@@ -101,9 +101,9 @@ def command(
     for refusal in refusals:
         tell(f"left out: {refusal}")
     conversions = [conversion for group in groups for conversion in group]
-    if form is options.Format.plain:
+    if form == "plain":
         _write_plain(conversions, named=every, free=free)
-    elif form is options.Format.table:
+    elif form == "table":
         for group in groups:
             _print_group(group, fixed_or_free, exposure)
     else:

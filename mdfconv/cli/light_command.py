@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption, argument, option
+from mdfconv.cli.options import ForceOption, FormatOption, PngOption, argument, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import console, form_of, write_table
@@ -56,11 +56,11 @@ def command(
         contents[png] = draw_spectrum(report.spectrum, map_.name)
     outputs.write(contents)
     form = form_of(format_)
-    if form is Format.json:
+    if form == "json":
         light = {"exponent": report.spectrum.exponent, "softness": report.softness}
         lists = {"conversions": rows, "spectrum": degrees}
         typer.echo(json_text({"map": str(map_), **light, **lists}))
         return
     write_table(list(rows[0]), rows, form, title="α of the best GGX for Beckmann's m_B")
-    say = console().print if form is Format.table else tell
+    say = console().print if form == "table" else tell
     say(report.sentence)

@@ -49,13 +49,13 @@ def command(
         return
     if metric is not None or exposure is not None:
         raise MdfconvError("--metric is of --encodings")
-    form = form_of(format_, in_pipe=options.Format.plain)
-    if form is options.Format.table:
+    form = form_of(format_, in_pipe="plain")
+    if form == "table":
         rows = [_row(mdf) for mdf in list_distributions()]
         print_table(list(rows[0]), rows)
     else:
         records = [_record(mdf) for mdf in list_distributions()]
-        write_table(["name"] if form is options.Format.plain else list(records[0]), records, form)
+        write_table(["name"] if form == "plain" else list(records[0]), records, form)
 
 
 def _list_encodings(metric: Metric, format_: options.Format | None) -> None:
@@ -64,10 +64,8 @@ def _list_encodings(metric: Metric, format_: options.Format | None) -> None:
 
     form = form_of(format_)
     records = encoding_records(metric)
-    if form is not options.Format.table:
-        write_table(
-            ["encoding"] if form is options.Format.plain else list(records[0]), records, form
-        )
+    if form != "table":
+        write_table(["encoding"] if form == "plain" else list(records[0]), records, form)
         return
     rows = [
         {

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -22,16 +21,8 @@ if TYPE_CHECKING:
 
 # Of a page a hundred million pixels, a third of a gigabyte.
 _LARGEST_DPI = 1200
-
-
-class Format(StrEnum):
-    """The forms in which results are written."""
-
-    table = "table"
-    plain = "plain"
-    csv = "csv"
-    json = "json"
-    markdown = "markdown"
+# The forms in which results are written.
+Format = Literal["table", "plain", "csv", "json", "markdown"]
 
 
 def option(metavar: str, help_: str, *names: str, words: Any = None, **more: Any) -> Any:

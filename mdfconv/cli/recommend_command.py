@@ -62,14 +62,14 @@ def command(
     rows, reason = recommendation.records(), recommendation.reason
     columns, answers = list(rows[0]), recommendation.chosen
     sentence = reason[0].upper() + reason[1:]
-    form = form_of(format_, in_pipe=options.Format.plain)
-    if form is options.Format.json:
+    form = form_of(format_, in_pipe="plain")
+    if form == "json":
         asked = {"from": end.label, "value": value, "metric": str(kept), "tolerance": tolerance}
         chosen = {use: vars(candidate) for use, candidate in answers.items()}
         typer.echo(json_text(asked | chosen | {"reason": reason, "candidates": rows}))
-    elif form is options.Format.markdown:
+    elif form == "markdown":
         typer.echo(f"{table_text(columns, rows, form)}\n\n{sentence}")
-    elif form is options.Format.table:
+    elif form == "table":
         shown = [{heading: row[key] for key, heading in _HEADINGS.items()} for row in rows]
         styles = ["bold" if row["chosen"] else "" if row["within"] else "dim" for row in rows]
         title = f"{end.label} {value:g} within {tolerance:g}, {kept}"
@@ -80,6 +80,6 @@ def command(
             f"{use} {answer.distribution} {value_text(answer.parameter)} {answer.method}"
             for use, answer in answers.items()
         ]
-        plain = form is options.Format.plain
+        plain = form == "plain"
         typer.echo("\n".join(lines) if plain else table_text(columns, rows, form))
         tell(reason)

@@ -32,7 +32,7 @@ _LONGEST_WORD = 24
 # Columns of text are hard to read in less.
 _READABLE_WIDTH = 16
 _LETTER = re.compile(r"[^\W\d_eE]")
-_ENDINGS = {".json": Format.json, ".md": Format.markdown, ".txt": Format.table}
+_ENDINGS: dict[str, Format] = {".json": "json", ".md": "markdown", ".txt": "table"}
 
 
 def value_text(value: float | tuple[float, ...]) -> str:
@@ -40,15 +40,13 @@ def value_text(value: float | tuple[float, ...]) -> str:
     return ",".join(map(number_text, value if isinstance(value, tuple) else (value,)))
 
 
-def form_of(
-    asked: Format | None, output: Path | None = None, *, in_pipe: Format = Format.csv
-) -> Format:
+def form_of(asked: Format | None, output: Path | None = None, *, in_pipe: Format = "csv") -> Format:
     """Return the form that was asked for, or that of a file's name, a terminal or a pipe."""
     if asked is not None:
         return asked
     if output is not None:
-        return _ENDINGS.get(output.suffix.lower(), Format.csv)
-    return Format.table if sys.stdout.isatty() else in_pipe
+        return _ENDINGS.get(output.suffix.lower(), "csv")
+    return "table" if sys.stdout.isatty() else in_pipe
 
 
 def write_table(
@@ -77,7 +75,7 @@ def write_table(
         outputs.write({**(beside or {}), **table})
     if output:
         return
-    if form is Format.table:
+    if form == "table":
         print_table(columns, rows, title, styles, secondary=secondary)
     else:
         typer.echo(table_text(columns, rows, form))
@@ -85,17 +83,17 @@ def write_table(
 
 def table_text(columns: Sequence[str], rows: Sequence[Record], form: Format) -> str:
     """Return rows as text in a form."""
-    if form is Format.json:
+    if form == "json":
         return json_text([{column: row[column] for column in columns} for row in rows])
-    if form is Format.table:
+    if form == "table":
         buffer = io.StringIO()
         _print(_console(buffer), _columns(columns, rows))
         return buffer.getvalue().rstrip()
-    number = cell_text if form is Format.markdown else str
+    number = cell_text if form == "markdown" else str
     flat = [{column: _flat(row[column], number) for column in columns} for row in rows]
-    if form is Format.csv:
+    if form == "csv":
         return csv_text(columns, flat)
-    if form is Format.markdown:
+    if form == "markdown":
         return markdown_text(columns, flat)
     return "\n".join(" ".join(_plain_cell(row[column]) for column in columns) for row in flat)
 

@@ -24,7 +24,7 @@ import mdfconv
 from mdfconv.cli import app
 from mdfconv.output import files as output_files
 from mdfconv.studies import report
-from mdfconv.studies.pages import Contents
+from mdfconv.studies.pages import PageFiles
 from tests.cli.runner import run_here as run
 from tests.light.maps import room, write_map
 
@@ -112,7 +112,7 @@ CASES = {
 
 
 def one_page():
-    return Contents(["new"], {})
+    return PageFiles(["new"], {})
 
 
 @pytest.fixture(autouse=True)

@@ -250,14 +250,10 @@ def _tell_new(cautions: Iterable[str], told: set[str]) -> None:
 def _write_plain(conversions: list[Conversion], *, named: bool, free: bool) -> None:
     """Write the bare results, behind their names where there are several targets."""
     _tell_new((text for conversion in conversions for text in conversion.cautions), set())
-    lines = []
     for conversion in conversions:
-        words = [conversion.target] if named else []
-        words.append(tables.value_text(conversion.result))
-        if free and conversion.gamma is not None:
-            words.append(tables.value_text(conversion.gamma))
-        lines.append(" ".join(words))
-    typer.echo("\n".join(lines))
+        numbers = [conversion.result, conversion.gamma if free else None]
+        words = [tables.value_text(number) for number in numbers if number is not None]
+        typer.echo(" ".join([conversion.target, *words] if named else words))
 
 
 def _print_group(group: list[Conversion], gamma: Gamma, exposure: float | None) -> None:
@@ -266,13 +262,13 @@ def _print_group(group: list[Conversion], gamma: Gamma, exposure: float | None) 
     headings = _headings(group[0])
     rows: list[dict[str, Any]] = []
     styles: list[str] = []
+    few = len(group) <= _VALUES_WITH_ALTERNATIVES and gamma != FREE
+    methods = [method.name for method in list_methods()] if few else []
     for conversion in group[: tables.ROWS_SHOWN]:
-        few = len(group) <= _VALUES_WITH_ALTERNATIVES and not conversion.exact
-        others = _by_other_methods(conversion, gamma) if few else []
-        rows += [
-            _row(conversion, headings),
-            *(_row(other, headings, first=False) for other in others),
-        ]
+        names = [name for name in methods if name != conversion.method and not conversion.exact]
+        others = _others(conversion, gamma, [(name, conversion.metric) for name in names])
+        rows.append(_row(conversion, headings))
+        rows += [_row(other, headings, first=False) for other in others]
         styles += ["bold", *["dim"] * len(others)]
     title = f"{' → '.join(headings[:2])}, {group[0].metric}"
     tables.print_table(list(rows[0]), rows, title, styles, count=len(group))
@@ -290,32 +286,18 @@ def _print_group(group: list[Conversion], gamma: Gamma, exposure: float | None) 
     if len(inexact) > _VALUES_WITH_ALTERNATIVES:
         return
     rows = []
+    metrics = options.every_metric(exposure)
     for conversion in inexact:
-        for number, other in enumerate(_under_other_metrics(conversion, gamma, exposure)):
+        rules = [(None, metric) for metric in metrics if str(metric) != conversion.metric]
+        for number, other in enumerate(_others(conversion, gamma, rules)):
             metric = metric_named(other.metric)
             row = _row(other, headings, first=number == 0)
             rows.append(row | {"fit under": str(metric), "for": metric.purpose})
     tables.print_table([*headings, "fit under", "for"], rows, "Fits under the other metrics")
 
 
-def _by_other_methods(chosen: Conversion, gamma: Gamma) -> list[Conversion]:
-    """Return the conversions of a value by the other methods that answer."""
-    if gamma == FREE:
-        return []
-    names = [method.name for method in list_methods() if method.name != chosen.method]
-    return _others(chosen, [(name, chosen.metric) for name in names], gamma)
-
-
-def _under_other_metrics(
-    chosen: Conversion, gamma: Gamma, exposure: float | None
-) -> list[Conversion]:
-    """Return the fits of a value under the other metrics."""
-    metrics = [metric for metric in options.every_metric(exposure) if str(metric) != chosen.metric]
-    return _others(chosen, [(None, metric) for metric in metrics], gamma)
-
-
 def _others(
-    chosen: Conversion, rules: list[tuple[str | None, str | Metric]], gamma: Gamma
+    chosen: Conversion, gamma: Gamma, rules: Iterable[tuple[str | None, str | Metric]]
 ) -> list[Conversion]:
     """Return what methods and metrics make of a value, but for those that have no answer."""
     found: list[Conversion] = []

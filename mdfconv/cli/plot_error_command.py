@@ -109,23 +109,18 @@ def _parameter_sets(
     from mdfconv.render.comparison import DRAWN, PAPER_SETS
     from mdfconv.studies.error_curves import parameters_for
 
-    if m_b:
-        shown = dict.fromkeys([reference, *(names or (_REFERENCE, *DRAWN))])
-        sets = {
-            f"error-m_b-{value_name(value)}": parameters_for(value, list(shown), method, metric)
-            for value in m_b
-        }
-    elif method:
+    if method and not m_b:
         raise MdfconvError("--method converts an --m-b: give one")
-    else:
-        shown = dict.fromkeys([reference, *(names or PAPER_SETS["fig1"])])
-        for name in shown:
-            if name not in PAPER_SETS["fig1"]:
-                raise MdfconvError(f"the paper's figures have no {name}: give --m-b")
-        sets = {
-            figure: {name: printed[name] for name in shown}
-            for figure, printed in PAPER_SETS.items()
-        }
+    printed = PAPER_SETS["fig1"]
+    shown = list(dict.fromkeys([reference, *(names or ((_REFERENCE, *DRAWN) if m_b else printed))]))
+    missing = [name for name in shown if name not in printed]
+    if missing and not m_b:
+        raise MdfconvError(f"the paper's figures have no {missing[0]}: give --m-b")
     if len(shown) == 1:
         raise MdfconvError(f"{reference} is the reference: name another --mdf to compare with it")
-    return sets
+    if not m_b:
+        return {figure: {name: of[name] for name in shown} for figure, of in PAPER_SETS.items()}
+    return {
+        f"error-m_b-{value_name(value)}": parameters_for(value, shown, method, metric)
+        for value in m_b
+    }

@@ -80,6 +80,5 @@ def command(
             f"{use} {answer.distribution} {value_text(answer.parameter)} {answer.method}"
             for use, answer in answers.items()
         ]
-        plain = form == "plain"
-        typer.echo("\n".join(lines) if plain else table_text(columns, rows, form))
+        typer.echo("\n".join(lines) if form == "plain" else table_text(columns, rows, form))
         tell(reason)

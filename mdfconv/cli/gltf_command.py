@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
@@ -10,13 +11,6 @@ from mdfconv.cli import completion, material_files, options
 from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from mdfconv.distributions.endpoint import Endpoint
-    from mdfconv.scene.gltf.asset import GltfConversion
-    from mdfconv.scene.material_files import Destination
 
 _HEADINGS = {
     "index": "#", "name": "material", "value": "was", "result": "is", "rmse": "RMSE",
@@ -85,8 +79,9 @@ def command(
     mdfconv gltf lamp.gltf -o new.gltf --from blinn-phong:assimp-gltf --specular 0.5 --compare
     """
     from mdfconv.distributions.endpoint import with_specular
-    from mdfconv.scene.gltf.asset import convert_gltf, factor_endpoints
+    from mdfconv.scene.gltf.asset import GltfConversion, convert_gltf, factor_endpoints
     from mdfconv.scene.gltf.images import GltfTextures
+    from mdfconv.scene.material_files import Destination
     from mdfconv.scene.shininess import ROUGHNESS, SHININESS
     from mdfconv.scene.stored import ProblemKind
 
@@ -109,17 +104,23 @@ def command(
     names = with_specular(source, target or ROUGHNESS, specular)
     # A mistake in the names is none of a file.
     pair = factor_endpoints(*names)
+    dialect = pair[0].encoding.name.partition(":")[0] if pair[0].encoding else ""
     if compare and pair[0].distribution.name != SHININESS:
         raise MdfconvError(f"--compare is about exponents, {pair[0].label} stores none")
 
     def convert(destination: Destination, data: bytes) -> GltfConversion:
-        _check_form(destination, data)
+        _check_form(destination.source, destination.output, data)
         folders = GltfTextures(destination.source.parent, destination.output.parent, lossy)
         with material_files.about(destination.source):
             conversion = convert_gltf(
                 data, *pair, metric=chosen, textures=folders if textures else None
             )
-        _tell_other_generator(destination.source, conversion.generator, pair[0])
+        proposals = _proposals(conversion.generator)
+        if proposals and dialect not in proposals:
+            tell(
+                f"note: {destination.source} was written by '{conversion.generator}', which stands "
+                f"for {' or '.join(proposals.values())}"
+            )
         return conversion
 
     report = material_files.MaterialReport(
@@ -141,28 +142,17 @@ def command(
     )
 
 
-def _check_form(destination: Destination, data: bytes) -> None:
+def _check_form(source: Path, output: Path, data: bytes) -> None:
     """Refuse a name that says of a file that it is of the other form, which it does not become."""
     from mdfconv.scene.gltf.document import is_glb
 
     form = ".glb" if is_glb(data) else ".gltf"
-    named = destination.output.suffix.lower()
-    renamed = destination.output.name != destination.source.name
-    if renamed and named in {".glb", ".gltf"} - {form}:
+    named = output.suffix.lower()
+    if output.name != source.name and named in {".glb", ".gltf"} - {form}:
         raise MdfconvError(
-            f"{destination.source} stays {form[1:]} in its form, {destination.output} says "
-            f"{named[1:]}",
-            f"name it {destination.output.with_suffix(form)}",
+            f"{source} stays {form[1:]} in its form, {output} says {named[1:]}",
+            f"name it {output.with_suffix(form)}",
         )
-
-
-def _tell_other_generator(path: Path, generator: str, source: Endpoint) -> None:
-    """Say that a file names a program that stores another number than the user said."""
-    proposals = _proposals(generator)
-    asked = source.encoding.name.partition(":")[0] if source.encoding else ""
-    if proposals and asked not in proposals:
-        options = " or ".join(proposals.values())
-        tell(f"note: {path} was written by '{generator}', which stands for {options}")
 
 
 def _proposals(generator: str) -> dict[str, str]:
@@ -173,9 +163,8 @@ def _proposals(generator: str) -> dict[str, str]:
     proposals = {}
     for dialect in dialects_by_generator(generator):
         needed = " --specular L" if dialect.specular is Specular.needed else ""
-        provided = f" {dialect.provided}" if dialect.provided else ""
-        option = f"--from {dialect.owners[0]}:{dialect.name}{needed}{provided}"
-        proposals[dialect.name] = option
+        option = f"--from {dialect.owners[0]}:{dialect.name}{needed} {dialect.provided}"
+        proposals[dialect.name] = option.rstrip()
     return proposals
 
 

@@ -57,13 +57,12 @@ def write_table(
     *,
     beside: Mapping[Path, bytes] | None = None,
     title: str = "",
-    styles: Sequence[str] = (),
     secondary: Sequence[str] = (),
 ) -> None:
     """Write rows to standard output or to the file of the table, in the form asked for.
 
     `beside` has other files of the command, written with that of the table or before it is printed;
-    title, `styles` of rows and `secondary` are those of `print_table`.
+    title and `secondary` are those of `print_table`.
     """
     output = outputs.table if outputs else None
     form = form_of(form, output)
@@ -76,7 +75,7 @@ def write_table(
     if output:
         return
     if form == "table":
-        print_table(columns, rows, title, styles, secondary=secondary)
+        print_table(columns, rows, title, secondary=secondary)
     else:
         typer.echo(table_text(columns, rows, form))
 
@@ -87,7 +86,7 @@ def table_text(columns: Sequence[str], rows: Sequence[Record], form: Format) -> 
         return json_text([{column: row[column] for column in columns} for row in rows])
     if form == "table":
         buffer = io.StringIO()
-        _print(_console(buffer), _columns(columns, rows))
+        _print(console(buffer), _columns(columns, rows))
         return buffer.getvalue().rstrip()
     number = cell_text if form == "markdown" else str
     flat = [{column: _flat(row[column], number) for column in columns} for row in rows]
@@ -95,7 +94,7 @@ def table_text(columns: Sequence[str], rows: Sequence[Record], form: Format) -> 
         return csv_text(columns, flat)
     if form == "markdown":
         return markdown_text(columns, flat)
-    return "\n".join(" ".join(_plain_cell(row[column]) for column in columns) for row in flat)
+    return "\n".join(" ".join(map(_plain_cell, row.values())) for row in flat)
 
 
 def print_table(
@@ -115,7 +114,7 @@ def print_table(
     are left out first, from the last one, then the last of the others; standard error says which,
     and what option shows `everything`.
     """
-    out = console(err=err)
+    out = console(sys.stderr if err else sys.stdout)
     shown = rows[:ROWS_SHOWN]
     table = _columns(columns, shown)
     printed = _with_room(table, out.width, secondary) if out.is_terminal else table
@@ -219,19 +218,16 @@ def _print(out: Console, table: list[_Column], title: str = "", styles: Sequence
     for number, cells in enumerate(zip(*(column.cells for column in table), strict=True)):
         rich.add_row(*map(escape, cells), style=styles[number] if styles else None)
     # Where no column can be left out a pipe is as wide as it takes.
-    _console(out.file, max(out.width, _framed(widths))).print(rich)
+    console(out.file, max(out.width, _framed(widths))).print(rich)
 
 
-def console(*, err: bool = False) -> Console:
-    """Return a Rich console on standard output or error, wide enough for a table in a pipe."""
-    return _console(sys.stderr if err else sys.stdout)
-
-
-def _console(stream: IO[str], width: int | None = None) -> Console:
+def console(stream: IO[str] | None = None, width: int | None = None) -> Console:
+    """Return a Rich console, usually on standard output, wide enough for a table in a pipe."""
     from rich.console import Console
 
-    usual = None if stream.isatty() else _PIPE_WIDTH
-    return Console(file=stream, width=width or usual, highlight=False)
+    file = stream or sys.stdout
+    usual = None if file.isatty() else _PIPE_WIDTH
+    return Console(file=file, width=width or usual, highlight=False)
 
 
 @contextmanager

@@ -15,13 +15,15 @@ from mdfconv.cli.options import argument, option
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import form_of, write_table
+from mdfconv.distributions import one_parameter_distributions
+from mdfconv.distributions.endpoint import Endpoint, one_parameter_endpoint
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import metric_named
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text
 from mdfconv.registry import ALL
 
 if TYPE_CHECKING:
-    from mdfconv.distributions.endpoint import Endpoint
     from mdfconv.render.comparison import PictureRule, Scene
 
 _COLUMNS = (
@@ -137,7 +139,8 @@ def command(
     outputs = Outputs(html, force=force)
     names = targets or []
     end = options.asked_endpoint(source)
-    ends = _targets(end, names)
+    every = any(name.strip().lower() == ALL for name in names)
+    ends = _targets(end, names, every=every)
     contents: dict[Path, bytes] = {}
     if html is not None:
         usual = [target for target in ends if target.label == _ON_PAGE and not names]
@@ -149,7 +152,7 @@ def command(
     options.refuse_idle_metric(context, method)
     rules = _rules(method, metric, exposure)
     surfaces = _surfaces(end, values)
-    if _asks_for_all(names):
+    if every:
         ends = _answering(surfaces.values(), rules, end, ends)
     scene = Scene(brdf, light, normalized, exposure, size, material)
     words = _words(scene, rules, names)
@@ -203,21 +206,15 @@ def _file_name(words: Sequence[str]) -> str:
     return re.sub(r"[^\w.+-]+", "-", "-".join(words))
 
 
-def _asks_for_all(targets: Sequence[str]) -> bool:
-    return any(name.strip().lower() == ALL for name in targets)
-
-
-def _targets(source: Endpoint, names: Sequence[str]) -> list[Endpoint]:
+def _targets(source: Endpoint, names: Sequence[str], *, every: bool) -> list[Endpoint]:
     """Return what takes the source's place: what is named, or the paper's other distributions."""
-    from mdfconv.distributions import one_parameter_distributions
-    from mdfconv.distributions.endpoint import one_parameter_endpoint
     from mdfconv.render.comparison import PAPER_SETS
 
-    if names and not _asks_for_all(names):
+    if names and not every:
         ends = [options.asked_endpoint(name) for name in names]
         return list({end.label: end for end in ends}.values())
-    every = [mdf.name for mdf in one_parameter_distributions()] if names else PAPER_SETS["fig1"]
-    return [one_parameter_endpoint(name) for name in every if name != source.distribution.name]
+    others = [mdf.name for mdf in one_parameter_distributions()] if every else PAPER_SETS["fig1"]
+    return [one_parameter_endpoint(name) for name in others if name != source.distribution.name]
 
 
 def _answering(
@@ -256,7 +253,6 @@ def _surfaces(source: Endpoint, values: list[float] | None) -> Mapping[str, floa
 
 def _rules(method: str | None, metric: str | None, exposure: float) -> list[PictureRule]:
     from mdfconv.conversion import method_named
-    from mdfconv.fitting.metrics import metric_named
     from mdfconv.render.comparison import PictureRule, default_rules
 
     if method is None and metric is None:

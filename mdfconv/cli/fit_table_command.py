@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -10,11 +10,10 @@ from mdfconv.cli import options
 from mdfconv.cli.options import flag, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import progress, write_table
+from mdfconv.distributions import distribution
+from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
-
-if TYPE_CHECKING:
-    from mdfconv.distributions.evaluation import Array
 
 _LARGEST_SWEEP = 10_000
 
@@ -104,7 +103,6 @@ def _sweep(sweep: str | None, m_b: list[float] | None) -> tuple[Array, Array]:
     """Return m_B and the limit of β for the paper's rows, a sweep or chosen values."""
     import numpy as np
 
-    from mdfconv.distributions import distribution
     from mdfconv.studies.table2 import angle_limit, paper_sweep
 
     if sweep and m_b:

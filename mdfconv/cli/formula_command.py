@@ -91,11 +91,9 @@ def command(
 
 
 def _range(text: str) -> tuple[float, float]:
-    low, colon, high = text.partition(":")
     try:
-        ends = float(low), float(high)
+        low, high = map(float, text.split(":"))
     except ValueError:
-        colon = ""
-    if not colon:
-        raise MdfconvError(f"--range is LO:HI, two numbers, not '{text}'", percent_hint(text, ":"))
-    return ends
+        reason = f"--range is LO:HI, two numbers, not '{text}'"
+        raise MdfconvError(reason, percent_hint(text, ":")) from None
+    return low, high

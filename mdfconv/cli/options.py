@@ -11,13 +11,13 @@ import typer
 
 from mdfconv.cli import completion
 from mdfconv.cli.process import tell
+from mdfconv.distributions.endpoint import Endpoint, one_parameter_endpoint
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 
 if TYPE_CHECKING:
     from mdfconv.conversion.values import Gamma
-    from mdfconv.distributions.endpoint import Endpoint
-    from mdfconv.fitting.metrics import Metric
 
 # Of a page a hundred million pixels, a third of a gigabyte.
 _LARGEST_DPI = 1200
@@ -140,8 +140,6 @@ def refuse_idle_metric(context: typer.Context, method: str | None) -> None:
 
 def chosen_metric(name: str, exposure: float | None = None) -> Metric:
     """Return the metric for the two options; refuse an exposure of a metric that has none."""
-    from mdfconv.fitting.metrics import metric_named
-
     if exposure is None:
         return metric_named(name)
     if metric_named(name).setting != "exposure":
@@ -153,8 +151,6 @@ def chosen_metric(name: str, exposure: float | None = None) -> Metric:
 
 def asked_metric(name: str | None, exposure: float | None) -> Metric | None:
     """Return the metric for the two options, None if neither is given."""
-    from mdfconv.fitting.metrics import list_metrics
-
     if name is None and exposure is None:
         return None
     return chosen_metric(list_metrics()[0] if name is None else name, exposure)
@@ -162,8 +158,6 @@ def asked_metric(name: str | None, exposure: float | None) -> Metric | None:
 
 def every_metric(exposure: float | None = None) -> list[Metric]:
     """Return all metrics, those that have an exposure with the one that was asked for."""
-    from mdfconv.fitting.metrics import list_metrics, metric_named
-
     return [
         chosen_metric(name, exposure if metric_named(name).setting == "exposure" else None)
         for name in list_metrics()
@@ -202,8 +196,6 @@ def noted(end: Endpoint) -> Endpoint:
 
 def asked_endpoint(name: str) -> Endpoint:
     """Return the distribution of one parameter, and its form, that an option names."""
-    from mdfconv.distributions.endpoint import one_parameter_endpoint
-
     return noted(one_parameter_endpoint(name))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,10 +13,8 @@ from mdfconv.cli.outputs import Outputs, check_folder, value_name
 from mdfconv.cli.tables import write_table
 from mdfconv.distributions import one_parameter_distribution
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric
 from mdfconv.output.files import file_bytes
-
-if TYPE_CHECKING:
-    from mdfconv.fitting.metrics import Metric
 
 _REFERENCE = "beckmann"
 _COLUMNS = ("figure", "distribution", "parameter", "max_error_percent", "beta_rad")

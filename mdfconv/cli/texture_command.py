@@ -85,14 +85,8 @@ def command(
     options.refuse_idle_metric(context, method)
     chosen = options.chosen_metric(metric, exposure)
     outputs = Outputs(output, png, force=force, inputs=[source_file, *chosen.inputs])
-    rule = TextureRule(
-        *with_specular(source, target, specular),
-        method,
-        str(chosen),
-        exponent_max,
-        log2_scale,
-        options.fixed_gamma(gamma),
-    )
+    ends, fixed = with_specular(source, target, specular), options.fixed_gamma(gamma)
+    rule = TextureRule(*ends, method, str(chosen), exponent_max, log2_scale, fixed)
     with outputs.staged() as files:
         report = convert_texture_file(
             source_file,

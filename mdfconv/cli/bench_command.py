@@ -15,7 +15,7 @@ from mdfconv.output.files import file_bytes
 from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
-    from mdfconv.studies.bench import Measurements, Task
+    from mdfconv.studies.bench import Measurements
 
 # The paper's reference, and its common rough and smooth surface.
 _REFERENCE, _PARAMETERS = "beckmann", (0.2, 0.05)
@@ -69,13 +69,30 @@ def command(
 
     mdfconv bench --format markdown --png speed-error.png > speed-error.md
     """
-    from mdfconv.studies import bench_page
-    from mdfconv.studies.bench import measure
+    import numpy as np
+
+    from mdfconv.conversion import convert
+    from mdfconv.distributions import one_parameter_distribution, one_parameter_distributions
+    from mdfconv.studies import bench, bench_page
 
     outputs = Outputs(csv, json, png, force=force)
-    task = _task(reference, parameter, source, target, quick=quick)
+    end = options.asked_endpoint(reference)
+    mdf = end.distribution
+    if parameter:
+        # The kernels compute in single precision, too.
+        lobes = mdf.parameter.check(end.decode(parameter), mdf.name, np.dtype(np.float32))
+    else:
+        lobes = np.asarray(convert(np.array(_PARAMETERS), _REFERENCE, mdf.name, "half-angle"))
+    task = bench.Task(
+        reference=mdf,
+        parameters=lobes,
+        candidates=tuple(one_parameter_distributions()),
+        source=one_parameter_distribution(source),
+        target=one_parameter_distribution(target),
+        sizes=bench.QUICK if quick else bench.FULL,
+    )
     with progress("Measuring", task.steps) as advance:
-        measurements = measure(task, advance)
+        measurements = bench.measure(task, advance)
     contents: dict[Path, bytes] = {}
     if csv:
         contents[csv] = file_bytes(_csv(measurements))
@@ -94,32 +111,6 @@ def command(
     else:
         for name, rows in bench_page.tables(measurements).items():
             write_table(list(rows[0]), rows, form, title=bench_page.title(measurements, name))
-
-
-def _task(
-    reference: str, parameter: list[float] | None, source: str, target: str, *, quick: bool
-) -> Task:
-    import numpy as np
-
-    from mdfconv.conversion import convert
-    from mdfconv.distributions import one_parameter_distribution, one_parameter_distributions
-    from mdfconv.studies.bench import FULL, QUICK, Task
-
-    end = options.asked_endpoint(reference)
-    mdf = end.distribution
-    if parameter:
-        # The kernels compute in single precision, too.
-        lobes = mdf.parameter.check(end.decode(parameter), mdf.name, np.dtype(np.float32))
-    else:
-        lobes = np.asarray(convert(np.array(_PARAMETERS), _REFERENCE, mdf.name, "half-angle"))
-    return Task(
-        reference=mdf,
-        parameters=lobes,
-        candidates=tuple(one_parameter_distributions()),
-        source=one_parameter_distribution(source),
-        target=one_parameter_distribution(target),
-        sizes=QUICK if quick else FULL,
-    )
 
 
 def _csv(measurements: Measurements) -> str:

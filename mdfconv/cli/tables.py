@@ -151,10 +151,6 @@ class _Column:
         readable = min(self.widest, _READABLE_WIDTH) if self.words else 0
         return max(readable, *map(_width, self.name.split()), *unbroken)
 
-    def width(self, limit: int) -> int:
-        """Return the width of a column that is to have at most so much."""
-        return max(self.narrowest, min(self.widest, limit))
-
 
 def _width(text: str) -> int:
     from rich.cells import cell_len
@@ -192,7 +188,7 @@ def _widths(table: list[_Column], room: int) -> list[int]:
     """Return what each column gets: all it can use, or of the same for all as much as fits."""
     widths = [column.narrowest for column in table]
     for limit in range(max((column.widest for column in table), default=0) + 1):
-        wider = [column.width(limit) for column in table]
+        wider = [max(column.narrowest, min(column.widest, limit)) for column in table]
         if _framed(wider) > room:
             break
         widths = wider

@@ -43,11 +43,8 @@ class _Command(TyperCommand):
     """A command that takes negative numbers for values and other unknown options for mistakes."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
-        known = [
-            name
-            for option in self.get_params(ctx)
-            for name in (*option.opts, *option.secondary_opts)
-        ]
+        options = self.get_params(ctx)
+        known = [name for option in options for name in option.opts + option.secondary_opts]
         for word in args[: args.index("--")] if "--" in args else args:
             name = word.partition("=")[0]
             if len(word) > 1 and word[0] == "-" and name not in known and not _is_number(word):
@@ -95,9 +92,8 @@ class _LazyGroup(TyperGroup):
         module = import_module(f"{__name__}.{name.replace('-', '_')}_command")
         single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
         panel = _COMMANDS[name]
-        single.command(name, cls=_Command, context_settings=_CONTEXT, rich_help_panel=panel)(
-            module.command
-        )
+        add = single.command(name, cls=_Command, context_settings=_CONTEXT, rich_help_panel=panel)
+        add(module.command)
         return typer.main.get_command(single)
 
 
@@ -135,7 +131,6 @@ def main() -> None:
     sys.exit(run(_answer))
 
 
+@whole_words()
 def _answer() -> int | None:
-    with whole_words():
-        status: int | None = typer.main.get_command(app).main(standalone_mode=False)
-    return status
+    return typer.main.get_command(app).main(standalone_mode=False)

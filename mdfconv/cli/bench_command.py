@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption, asked_endpoint
+from mdfconv.cli import completion, options
+from mdfconv.cli.options import flag, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import form_of, progress, table_text, write_table
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
-    from mdfconv.studies.bench import Measurements, Task
+    from mdfconv.studies.bench import Measurements
 
 # The paper's reference, and its common rough and smooth surface.
 _REFERENCE, _PARAMETERS = "beckmann", (0.2, 0.05)
@@ -24,51 +24,33 @@ _REFERENCE, _PARAMETERS = "beckmann", (0.2, 0.05)
 def command(
     reference: Annotated[
         str,
-        typer.Option(
-            metavar="MDF",
-            autocompletion=completion.endpoints,
-            help="Distribution that the others take the place of.",
+        option(
+            "MDF", "Distribution that the others take the place of.", words=completion.endpoints
         ),
     ] = _REFERENCE,
     parameter: Annotated[
         list[float] | None,
-        typer.Option(
-            metavar="P",
-            help="Its parameter; repeatable; by default lobes as wide as beckmann's at 0.2 and "
-            "0.05.",
+        option(
+            "P",
+            "Its parameter; repeatable; by default lobes as wide as beckmann's at 0.2 and 0.05.",
         ),
     ] = None,
     source: Annotated[
         str,
-        typer.Option(
-            "--from",
-            metavar="MDF",
-            autocompletion=completion.distributions,
-            help="Source of the timed conversions.",
-        ),
+        option("MDF", "Source of the timed conversions.", "--from", words=completion.distributions),
     ] = _REFERENCE,
     target: Annotated[
         str,
-        typer.Option(
-            "--to",
-            metavar="MDF",
-            autocompletion=completion.distributions,
-            help="Target of the timed conversions.",
-        ),
+        option("MDF", "Target of the timed conversions.", "--to", words=completion.distributions),
     ] = "ggx",
     quick: Annotated[
-        bool,
-        typer.Option("--quick", help="Less than a minute in place of some: fewer values, rounds."),
+        bool, flag("--quick", "Less than a minute in place of some: fewer values, rounds.")
     ] = False,
-    format_: FormatOption = None,
-    csv: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the tables as one CSV.")
-    ] = None,
-    json: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write tables and machine as JSON.")
-    ] = None,
-    png: PngOption = None,
-    force: ForceOption = False,
+    format_: options.FormatOption = None,
+    csv: Annotated[Path | None, option("FILE", "Write the tables as one CSV.")] = None,
+    json: Annotated[Path | None, option("FILE", "Write tables and machine as JSON.")] = None,
+    png: options.PngOption = None,
+    force: options.ForceOption = False,
 ) -> None:
     """Measure speed against error on this machine.
 
@@ -87,59 +69,44 @@ def command(
 
     mdfconv bench --format markdown --png speed-error.png > speed-error.md
     """
-    from mdfconv.studies.bench import measure
-
-    outputs = Outputs(csv, json, png, force=force)
-    task = _task(reference, parameter, source, target, quick=quick)
-    with progress("Measuring", task.steps) as advance:
-        measurements = measure(task, advance)
-    contents: dict[Path, bytes] = {}
-    if csv:
-        contents[csv] = file_bytes(_csv(measurements))
-    if json:
-        contents[json] = file_bytes(_json(measurements))
-    if png:
-        from mdfconv.studies.bench_page import draw
-
-        contents[png] = draw(measurements)
-    outputs.write(contents)
-    _print(measurements, form_of(format_), png)
-
-
-def _task(
-    reference: str, parameter: list[float] | None, source: str, target: str, *, quick: bool
-) -> Task:
     import numpy as np
 
     from mdfconv.conversion import convert
     from mdfconv.distributions import one_parameter_distribution, one_parameter_distributions
-    from mdfconv.studies.bench import FULL, QUICK, Task
+    from mdfconv.studies import bench, bench_page
 
-    end = asked_endpoint(reference)
+    outputs = Outputs(csv, json, png, force=force)
+    end = options.asked_endpoint(reference)
     mdf = end.distribution
     if parameter:
         # The kernels compute in single precision, too.
         lobes = mdf.parameter.check(end.decode(parameter), mdf.name, np.dtype(np.float32))
     else:
         lobes = np.asarray(convert(np.array(_PARAMETERS), _REFERENCE, mdf.name, "half-angle"))
-    return Task(
+    task = bench.Task(
         reference=mdf,
         parameters=lobes,
         candidates=tuple(one_parameter_distributions()),
         source=one_parameter_distribution(source),
         target=one_parameter_distribution(target),
-        sizes=QUICK if quick else FULL,
+        sizes=bench.QUICK if quick else bench.FULL,
     )
-
-
-def _print(measurements: Measurements, form: Format, png: Path | None) -> None:
-    from mdfconv.studies import bench_page
-
-    if form is Format.csv:
+    with progress("Measuring", task.steps) as advance:
+        measurements = bench.measure(task, advance)
+    contents: dict[Path, bytes] = {}
+    if csv:
+        contents[csv] = file_bytes(_csv(measurements))
+    if json:
+        contents[json] = file_bytes(_json(measurements))
+    if png:
+        contents[png] = bench_page.draw(measurements)
+    outputs.write(contents)
+    form = form_of(format_)
+    if form == "csv":
         typer.echo(_csv(measurements))
-    elif form is Format.json:
+    elif form == "json":
         typer.echo(_json(measurements))
-    elif form is Format.markdown:
+    elif form == "markdown":
         typer.echo(bench_page.markdown_page(measurements, png.name if png else None))
     else:
         for name, rows in bench_page.tables(measurements).items():
@@ -151,7 +118,7 @@ def _csv(measurements: Measurements) -> str:
     columns = dict.fromkeys(name for rows in tables.values() for row in rows for name in row)
     blank = dict.fromkeys(columns)
     rows = [{"table": name} | blank | row for name, table in tables.items() for row in table]
-    return table_text(["table", *columns], rows, Format.csv)
+    return table_text(["table", *columns], rows, "csv")
 
 
 def _json(measurements: Measurements) -> str:

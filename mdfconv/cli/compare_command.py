@@ -4,36 +4,26 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from enum import StrEnum
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import (
-    DpiOption,
-    FolderOption,
-    ForceOption,
-    Format,
-    FormatOption,
-    FromOption,
-    MethodOption,
-    asked_endpoint,
-    chosen_metric,
-    refuse_idle_metric,
-)
+from mdfconv.cli import completion, options
+from mdfconv.cli.options import argument, option
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import form_of, write_table
+from mdfconv.distributions import one_parameter_distributions
+from mdfconv.distributions.endpoint import Endpoint, one_parameter_endpoint
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import metric_named
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import csv_text
 from mdfconv.registry import ALL
 
 if TYPE_CHECKING:
-    from mdfconv.distributions.endpoint import Endpoint
     from mdfconv.render.comparison import PictureRule, Scene
 
 _COLUMNS = (
@@ -48,86 +38,67 @@ _REFERENCE = "beckmann"
 _ON_PAGE = "ggx"
 
 
-class LightName(StrEnum):
-    """The lights of the scene."""
-
-    directional = "directional"
-    area = "area"
-
-
-class Brdf(StrEnum):
-    """The BRDFs into which a distribution can be put."""
-
-    ashikhmin_shirley = "ashikhmin-shirley"
-    cook_torrance = "cook-torrance"
-    smoothie = "smoothie"
-    smoothie_approx = "smoothie-approx"
-    modified_phong = "modified-phong"
+# The BRDFs into which a distribution can be put.
+_Brdf = Literal[
+    "ashikhmin-shirley", "cook-torrance", "smoothie", "smoothie-approx", "modified-phong"
+]
 
 
 def command(
     context: typer.Context,
     values: Annotated[
         list[float] | None,
-        typer.Argument(
-            metavar="[VALUE]...",
-            help="Parameters of the source; of beckmann 0.4 and 0.04464 if not given.",
-            show_default=False,
+        argument(
+            "[VALUE]...", "Parameters of the source; of beckmann 0.4 and 0.04464 if not given."
         ),
     ] = None,
-    source: FromOption = _REFERENCE,
+    source: options.FromOption = _REFERENCE,
     targets: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            "MDF",
+            "What takes its place, as for --from; repeatable; the paper's if not given.",
             "--to",
-            metavar="MDF",
-            autocompletion=completion.targets,
-            help="What takes its place, as for --from; repeatable; the paper's if not given.",
+            words=completion.targets,
         ),
     ] = None,
-    method: MethodOption = None,
+    method: options.MethodOption = None,
     metric: Annotated[
-        str | None,
-        typer.Option(
-            metavar="METRIC", autocompletion=completion.metrics, help="What --method fit keeps."
-        ),
+        str | None, option("METRIC", "What --method fit keeps.", words=completion.metrics)
     ] = None,
     exposure: Annotated[
         float,
-        typer.Option(
-            metavar="E",
-            help="Exposure: 1 displays the source's peak, or its brightest channel, as white.",
-        ),
+        option("E", "Exposure: 1 displays the source's peak, or its brightest channel, as white."),
     ] = 1.0,
-    light: Annotated[LightName, typer.Option(help="A directional light or a square one.")] = (
-        LightName.directional
-    ),
+    light: Annotated[
+        Literal["directional", "area"], typer.Option(help="A directional light or a square one.")
+    ] = "directional",
     brdf: Annotated[
-        Brdf, typer.Option(help="The BRDF into which the distribution is put.")
-    ] = Brdf.ashikhmin_shirley,
+        _Brdf, typer.Option(help="The BRDF into which the distribution is put.")
+    ] = "ashikhmin-shirley",
     material: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME",
-            autocompletion=completion.materials,
-            help="What is reflected: gold, silver, copper, nickel, iron or chrome, in colour; "
+        option(
+            "NAME",
+            "What is reflected: gold, silver, copper, nickel, iron or chrome, in colour; "
             "acrylic, polycarbonate, polystyrene, polyethylene, polypropylene or pvc.",
+            words=completion.materials,
         ),
     ] = None,
     normalized: Annotated[bool, typer.Option("--normalized/--unit", help="The form of D.")] = True,
-    size: Annotated[int, typer.Option(metavar="N", help="Pixels a side of a picture.")] = 256,
+    size: Annotated[int, option("N", "Pixels a side of a picture.")] = 256,
     html: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Write a page with sliders instead, from the first VALUE and for the first --to. "
+        option(
+            "FILE",
+            "Write a page with sliders instead, from the first VALUE and for the first --to. "
             "Pictures, too, only with --output.",
         ),
     ] = None,
-    dpi: DpiOption = 120,
-    output: FolderOption = None,
-    force: ForceOption = False,
-    format_: FormatOption = None,
+    dpi: options.DpiOption = 120,
+    output: options.FolderOption = None,
+    force: options.ForceOption = False,
+    format_: options.FormatOption = None,
 ) -> None:
     """Render a sphere with one distribution put in another's place: Figures 3 to 5.
 
@@ -167,8 +138,9 @@ def command(
 
     outputs = Outputs(html, force=force)
     names = targets or []
-    end = asked_endpoint(source)
-    ends = _targets(end, names)
+    end = options.asked_endpoint(source)
+    every = any(name.strip().lower() == ALL for name in names)
+    ends = _targets(end, names, every=every)
     contents: dict[Path, bytes] = {}
     if html is not None:
         usual = [target for target in ends if target.label == _ON_PAGE and not names]
@@ -177,12 +149,12 @@ def command(
         if output is None:
             outputs.write(contents)
             return
-    refuse_idle_metric(context, method)
+    options.refuse_idle_metric(context, method)
     rules = _rules(method, metric, exposure)
     surfaces = _surfaces(end, values)
-    if _asks_for_all(names):
+    if every:
         ends = _answering(surfaces.values(), rules, end, ends)
-    scene = Scene(brdf.value, light.value, normalized, exposure, size, material)
+    scene = Scene(brdf, light, normalized, exposure, size, material)
     words = _words(scene, rules, names)
     figures = {_file_name([start, *words]): value for start, value in surfaces.items()}
     folder = check_folder(context, output)
@@ -196,7 +168,7 @@ def command(
         contents[folder / f"{name}.png"] = draw_comparison(comparison, dpi)
     outputs.write(contents)
     form = form_of(format_)
-    if form is Format.table:
+    if form == "table":
         # People read parameters with their symbols.
         texts = {target.label: target.text for target in ends}
         for row in rows:
@@ -234,21 +206,15 @@ def _file_name(words: Sequence[str]) -> str:
     return re.sub(r"[^\w.+-]+", "-", "-".join(words))
 
 
-def _asks_for_all(targets: Sequence[str]) -> bool:
-    return any(name.strip().lower() == ALL for name in targets)
-
-
-def _targets(source: Endpoint, names: Sequence[str]) -> list[Endpoint]:
+def _targets(source: Endpoint, names: Sequence[str], *, every: bool) -> list[Endpoint]:
     """Return what takes the source's place: what is named, or the paper's other distributions."""
-    from mdfconv.distributions import one_parameter_distributions
-    from mdfconv.distributions.endpoint import one_parameter_endpoint
     from mdfconv.render.comparison import PAPER_SETS
 
-    if names and not _asks_for_all(names):
-        ends = [asked_endpoint(name) for name in names]
+    if names and not every:
+        ends = [options.asked_endpoint(name) for name in names]
         return list({end.label: end for end in ends}.values())
-    every = [mdf.name for mdf in one_parameter_distributions()] if names else PAPER_SETS["fig1"]
-    return [one_parameter_endpoint(name) for name in every if name != source.distribution.name]
+    others = [mdf.name for mdf in one_parameter_distributions()] if every else PAPER_SETS["fig1"]
+    return [one_parameter_endpoint(name) for name in others if name != source.distribution.name]
 
 
 def _answering(
@@ -287,7 +253,6 @@ def _surfaces(source: Endpoint, values: list[float] | None) -> Mapping[str, floa
 
 def _rules(method: str | None, metric: str | None, exposure: float) -> list[PictureRule]:
     from mdfconv.conversion import method_named
-    from mdfconv.fitting.metrics import metric_named
     from mdfconv.render.comparison import PictureRule, default_rules
 
     if method is None and metric is None:
@@ -295,5 +260,5 @@ def _rules(method: str | None, metric: str | None, exposure: float) -> list[Pict
     chosen = metric_named(metric or "unit")
     if chosen.setting == "exposure":
         # A screen's picture is exposed as the scene is.
-        chosen = chosen_metric(chosen.name, exposure)
+        chosen = options.chosen_metric(chosen.name, exposure)
     return [PictureRule(method_named(method or "fit").name, chosen)]

@@ -10,7 +10,7 @@ import io
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 
 _COLON = ":"
@@ -18,11 +18,29 @@ _COLON = ":"
 _TEXELS_OF_EXPONENTS = ("exponent", "log2")
 
 
-def distributions() -> list[str]:
-    """Return the names of the distributions."""
-    from mdfconv.distributions import list_distributions
+def _names(place: str) -> Callable[[], list[str]]:
+    """Return what lists the names at a place of the package, those of records by their ``name``."""
 
-    return [mdf.name for mdf in list_distributions()]
+    def names() -> list[str]:
+        from pkgutil import resolve_name
+
+        known = resolve_name(f"mdfconv.{place}")
+        listed = known() if callable(known) else known
+        return [str(getattr(each, "name", each)) for each in listed]
+
+    return names
+
+
+distributions = _names("distributions:list_distributions")
+methods = _names("conversion:list_methods")
+metrics = _names("fitting.metrics:list_metrics")
+languages = _names("formula:LANGUAGES.names")
+mtl_targets = _names("scene.mtl.library:To.__members__")
+mitsuba_targets = _names("scene.mitsuba.scene:TARGETS")
+angle_units = _names("measured.samples:UNITS")
+normalizers = _names("brdf.reflection:NORMALIZERS.names")
+maskings = _names("brdf.microfacet:MASKINGS.names")
+materials = _names("brdf.fresnel:list_materials")
 
 
 def endpoints(incomplete: str) -> list[str]:
@@ -63,41 +81,6 @@ def texels(incomplete: str) -> list[str]:
     return [*endpoints(incomplete), *stored]
 
 
-def mtl_targets() -> list[str]:
-    """Return what a material library is converted to."""
-    from mdfconv.scene.mtl.library import To
-
-    return list(To)
-
-
-def mitsuba_targets() -> list[str]:
-    """Return the distributions to which a scene is converted."""
-    from mdfconv.scene.mitsuba.scene import TARGETS
-
-    return list(TARGETS)
-
-
-def methods() -> list[str]:
-    """Return the names of the conversion methods."""
-    from mdfconv.conversion import list_methods
-
-    return [method.name for method in list_methods()]
-
-
-def metrics() -> list[str]:
-    """Return the names of the metrics."""
-    from mdfconv.fitting.metrics import list_metrics
-
-    return list(list_metrics())
-
-
-def languages() -> list[str]:
-    """Return the languages of formulas."""
-    from mdfconv.formula import LANGUAGES
-
-    return LANGUAGES.names
-
-
 def furnace_brdfs(incomplete: str) -> list[str]:
     """Return the BRDFs that the furnace takes; once a colon is typed, the forms of a parameter."""
     from mdfconv.studies.furnace import list_models, model_distribution
@@ -114,34 +97,6 @@ def fresnel_factors() -> list[str]:
     from mdfconv.measured.brdf_fit import FRESNELS
 
     return [name.removesuffix("N") for name in FRESNELS]
-
-
-def angle_units() -> list[str]:
-    """Return the units in which files may give angles."""
-    from mdfconv.measured.samples import UNITS
-
-    return list(UNITS)
-
-
-def normalizers() -> list[str]:
-    """Return the normalizers of modified Phong."""
-    from mdfconv.brdf.reflection import NORMALIZERS
-
-    return NORMALIZERS.names
-
-
-def maskings() -> list[str]:
-    """Return the masking functions."""
-    from mdfconv.brdf.microfacet import MASKINGS
-
-    return MASKINGS.names
-
-
-def materials() -> list[str]:
-    """Return the materials that are known by name."""
-    from mdfconv.brdf.fresnel import list_materials
-
-    return list_materials()
 
 
 @contextmanager

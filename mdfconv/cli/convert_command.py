@@ -12,29 +12,9 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from mdfconv.cli.options import (
-    ExposureOption,
-    Format,
-    FormatOption,
-    FromOption,
-    GammaOption,
-    MethodOption,
-    OptionalMetricOption,
-    SpecularOption,
-    ToOption,
-    asked_metric,
-    chosen_gamma,
-    every_metric,
-)
+from mdfconv.cli import options, tables
+from mdfconv.cli.options import argument
 from mdfconv.cli.process import tell
-from mdfconv.cli.tables import (
-    ROWS_SHOWN,
-    console,
-    form_of,
-    print_table,
-    table_text,
-    value_text,
-)
 from mdfconv.conversion import Conversion, explain, list_methods
 from mdfconv.conversion.explanation import explained
 from mdfconv.conversion.values import FREE, ConversionRule, Gamma, Value, holds_pairs
@@ -57,20 +37,20 @@ _DECIMAL_COMMA = re.compile(r"\s*[+-]?0,\d+\s*\Z")
 def command(
     values: Annotated[
         list[str],
-        typer.Argument(
-            metavar="VALUE...",
-            help="Parameters of the source; a pair X,Y for an anisotropic surface; - reads "
+        argument(
+            "VALUE...",
+            "Parameters of the source; a pair X,Y for an anisotropic surface; - reads "
             "values from standard input, one a line.",
         ),
     ],
-    source: FromOption,
-    target: ToOption,
-    method: MethodOption = None,
-    metric: OptionalMetricOption = None,
-    exposure: ExposureOption = None,
-    gamma: GammaOption = None,
-    specular: SpecularOption = None,
-    format_: FormatOption = None,
+    source: options.FromOption,
+    target: options.ToOption,
+    method: options.MethodOption = None,
+    metric: options.OptionalMetricOption = None,
+    exposure: options.ExposureOption = None,
+    gamma: options.GammaOption = None,
+    specular: options.SpecularOption = None,
+    format_: options.FormatOption = None,
 ) -> None:
     """Convert parameters from one distribution to another.
 
@@ -97,19 +77,19 @@ def command(
 
     seq 0.1 0.1 0.4 | mdfconv convert --from ggx --to beckmann --method half-angle -
     """
-    form = form_of(format_, in_pipe=Format.plain)
-    asked, fixed_or_free = asked_metric(metric, exposure), chosen_gamma(gamma)
+    form = tables.form_of(format_, in_pipe="plain")
+    asked, fixed_or_free = options.asked_metric(metric, exposure), options.chosen_gamma(gamma)
     every, free = target.strip().lower() == ALL, fixed_or_free == FREE
     source, target = with_specular(source, source if every else target, specular)
-    if form is Format.plain and not every and not free:
+    if form == "plain" and not every and not free:
         _stream(read_blocks(values), ConversionRule(source, target, method, asked, fixed_or_free))
         return
     numbers = [number for block in read_blocks(values) for number in block.numbers]
     groups: list[list[Conversion]] = []
     refusals: list[MdfconvError] = []
+    errors = form != "plain"
     for name in _targets(numbers, source) if every else [target]:
         own = fixed_or_free if not every or _takes_gamma(source, name, free=free) else None
-        errors = form is not Format.plain
         try:
             groups.append(
                 explain(numbers, source, name, method, metric=asked, gamma=own, errors=errors)
@@ -120,15 +100,16 @@ def command(
         raise refusals[0]
     for refusal in refusals:
         tell(f"left out: {refusal}")
-    if form is Format.plain:
-        _write_plain(groups, named=every, free=free)
-    elif form is Format.table:
+    conversions = [conversion for group in groups for conversion in group]
+    if form == "plain":
+        _write_plain(conversions, named=every, free=free)
+    elif form == "table":
         for group in groups:
             _print_group(group, fixed_or_free, exposure)
     else:
-        records = [_record(conversion) for group in groups for conversion in group]
+        records = [_record(conversion) for conversion in conversions]
         columns = [name for name in records[0] if any(r[name] is not None for r in records)]
-        typer.echo(table_text(columns, records, form))
+        typer.echo(tables.table_text(columns, records, form))
 
 
 def _targets(numbers: list[Value], source: str) -> list[str]:
@@ -233,7 +214,7 @@ def _results(numbers: list[Value], rule: ConversionRule) -> tuple[list[str], lis
     if holds_pairs(numbers):
         conversions = explained(numbers, rule, errors=False)
         cautions = [text for conversion in conversions for text in conversion.cautions]
-        return [value_text(conversion.result) for conversion in conversions], cautions
+        return [tables.value_text(conversion.result) for conversion in conversions], cautions
     converted = rule.convert(np.array(numbers, dtype=float))
     return list(map(number_text, converted.stored.tolist())), rule.true_cautions(converted)
 
@@ -266,35 +247,31 @@ def _tell_new(cautions: Iterable[str], told: set[str]) -> None:
             told.add(caution)
 
 
-def _write_plain(groups: list[list[Conversion]], *, named: bool, free: bool) -> None:
+def _write_plain(conversions: list[Conversion], *, named: bool, free: bool) -> None:
     """Write the bare results, behind their names where there are several targets."""
-    conversions = [conversion for group in groups for conversion in group]
     _tell_new((text for conversion in conversions for text in conversion.cautions), set())
-    lines = []
     for conversion in conversions:
-        words = [conversion.target] if named else []
-        words.append(value_text(conversion.result))
-        if free and conversion.gamma is not None:
-            words.append(value_text(conversion.gamma))
-        lines.append(" ".join(words))
-    typer.echo("\n".join(lines))
+        numbers = [conversion.result, conversion.gamma if free else None]
+        words = [tables.value_text(number) for number in numbers if number is not None]
+        typer.echo(" ".join([conversion.target, *words] if named else words))
 
 
 def _print_group(group: list[Conversion], gamma: Gamma, exposure: float | None) -> None:
     """Print the conversions to a target by every method, and the fits under the other metrics."""
-    out = console()
+    out = tables.console()
     headings = _headings(group[0])
     rows: list[dict[str, Any]] = []
     styles: list[str] = []
-    for conversion in group[:ROWS_SHOWN]:
+    few = len(group) <= _VALUES_WITH_ALTERNATIVES and gamma != FREE
+    methods = [method.name for method in list_methods()] if few else []
+    for conversion in group[: tables.ROWS_SHOWN]:
+        names = [name for name in methods if name != conversion.method and not conversion.exact]
+        others = _others(conversion, gamma, [(name, conversion.metric) for name in names])
         rows.append(_row(conversion, headings))
-        styles.append("bold")
-        if len(group) <= _VALUES_WITH_ALTERNATIVES and not conversion.exact:
-            others = _by_other_methods(conversion, gamma)
-            rows += [_row(other, headings, first=False) for other in others]
-            styles += ["dim"] * len(others)
+        rows += [_row(other, headings, first=False) for other in others]
+        styles += ["bold", *["dim"] * len(others)]
     title = f"{' → '.join(headings[:2])}, {group[0].metric}"
-    print_table(list(rows[0]), rows, title, styles, count=len(group))
+    tables.print_table(list(rows[0]), rows, title, styles, count=len(group))
     for caution in dict.fromkeys(text for conversion in group for text in conversion.cautions):
         out.print(f"Note: {caution}.")
     inexact = [conversion for conversion in group if not conversion.exact]
@@ -309,32 +286,18 @@ def _print_group(group: list[Conversion], gamma: Gamma, exposure: float | None) 
     if len(inexact) > _VALUES_WITH_ALTERNATIVES:
         return
     rows = []
+    metrics = options.every_metric(exposure)
     for conversion in inexact:
-        for number, other in enumerate(_under_other_metrics(conversion, gamma, exposure)):
+        rules = [(None, metric) for metric in metrics if str(metric) != conversion.metric]
+        for number, other in enumerate(_others(conversion, gamma, rules)):
             metric = metric_named(other.metric)
             row = _row(other, headings, first=number == 0)
             rows.append(row | {"fit under": str(metric), "for": metric.purpose})
-    print_table([*headings, "fit under", "for"], rows, "Fits under the other metrics")
-
-
-def _by_other_methods(chosen: Conversion, gamma: Gamma) -> list[Conversion]:
-    """Return the conversions of a value by the other methods that answer."""
-    if gamma == FREE:
-        return []
-    names = [method.name for method in list_methods() if method.name != chosen.method]
-    return _others(chosen, [(name, chosen.metric) for name in names], gamma)
-
-
-def _under_other_metrics(
-    chosen: Conversion, gamma: Gamma, exposure: float | None
-) -> list[Conversion]:
-    """Return the fits of a value under the other metrics."""
-    metrics = [metric for metric in every_metric(exposure) if str(metric) != chosen.metric]
-    return _others(chosen, [(None, metric) for metric in metrics], gamma)
+    tables.print_table([*headings, "fit under", "for"], rows, "Fits under the other metrics")
 
 
 def _others(
-    chosen: Conversion, rules: list[tuple[str | None, str | Metric]], gamma: Gamma
+    chosen: Conversion, gamma: Gamma, rules: Iterable[tuple[str | None, str | Metric]]
 ) -> list[Conversion]:
     """Return what methods and metrics make of a value, but for those that have no answer."""
     found: list[Conversion] = []

@@ -220,7 +220,7 @@ def command(
         from mdfconv.measured.report import report_files
 
         line = join(["mdfconv", *sys.argv[1:]])
-        texts = _shown(rows, Format.markdown)
+        texts = _shown(rows, "markdown")
         contents |= report_files(analyses[0], texts, line, report, logarithms=logarithms)
     title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
     ranked = "log_rmse" if logarithms and "log_rmse" in names else "rmse"
@@ -278,9 +278,9 @@ def _table(
 
 def _shown(rows: list[dict[str, Any]], form: Format) -> list[dict[str, Any]]:
     """Return the records for the form: lists and nulls where they have a place, else text."""
-    if form in (Format.json, Format.table):
+    if form in ("json", "table"):
         return rows
-    number = cell_text if form is Format.markdown else repr
+    number = cell_text if form == "markdown" else repr
 
     def text(value: Any) -> Any:
         if isinstance(value, list):

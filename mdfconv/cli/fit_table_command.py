@@ -2,61 +2,47 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from mdfconv.cli.options import (
-    ExposureOption,
-    ForceOption,
-    FormatOption,
-    MetricOption,
-    OutputOption,
-    chosen_metric,
-    every_metric,
-    refuse_given,
-)
+from mdfconv.cli import options
+from mdfconv.cli.options import flag, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import progress, write_table
+from mdfconv.distributions import distribution
+from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
-
-if TYPE_CHECKING:
-    from mdfconv.distributions.evaluation import Array
 
 _LARGEST_SWEEP = 10_000
 
 
 def command(
     context: typer.Context,
-    format_: FormatOption = None,
-    output: OutputOption = None,
+    format_: options.FormatOption = None,
+    output: options.OutputOption = None,
     compare: Annotated[
-        bool,
-        typer.Option("--compare", help="Put each printed cell of the paper beside ours."),
+        bool, flag("--compare", "Put each printed cell of the paper beside ours.")
     ] = False,
     sweep: Annotated[
         str | None,
-        typer.Option(
-            metavar="LO:HI:COUNT",
-            help="Fit other m_B, spaced logarithmically; unit forms on β up to 4 m_B, where the "
+        option(
+            "LO:HI:COUNT",
+            "Fit other m_B, spaced logarithmically; unit forms on β up to 4 m_B, where the "
             "paper's rows have limits of their own.",
         ),
     ] = None,
-    m_b: Annotated[
-        list[float] | None, typer.Option("--m-b", metavar="M", help="Fit this m_B; repeatable.")
-    ] = None,
-    metric: MetricOption = "unit",
-    exposure: ExposureOption = None,
+    m_b: Annotated[list[float] | None, option("M", "Fit this m_B; repeatable.")] = None,
+    metric: options.MetricOption = "unit",
+    exposure: options.ExposureOption = None,
     extended: Annotated[
-        bool,
-        typer.Option("--extended", help="Add what the paper's table lacks, with γ."),
+        bool, flag("--extended", "Add what the paper's table lacks, with γ.")
     ] = False,
     closed_forms: Annotated[
-        bool,
-        typer.Option("--closed-forms", help="Refit the coefficients of the paper's formulas."),
+        bool, flag("--closed-forms", "Refit the coefficients of the paper's formulas.")
     ] = False,
-    force: ForceOption = False,
+    force: options.ForceOption = False,
 ) -> None:
     """Reproduce Table 2 of Sawicki 2021: Beckmann fitted by the others over a sweep of m_B.
 
@@ -80,9 +66,11 @@ def command(
             "--compare and --closed-forms speak of the paper's rows: give one of them, without "
             "--sweep, --m-b or --extended"
         )
-    chosen = chosen_metric(metric, exposure)
+    chosen = options.chosen_metric(metric, exposure)
     if closed_forms:
-        refuse_given(context, ["metric"], "does not go with --closed-forms, which has every metric")
+        options.refuse_given(
+            context, ["metric"], "does not go with --closed-forms, which has every metric"
+        )
     if compare and chosen.name != "unit":
         raise MdfconvError("--compare: the paper's table has the unit metric only")
     outputs = Outputs(table=output, force=force, inputs=chosen.inputs)
@@ -90,7 +78,7 @@ def command(
     if closed_forms:
         from mdfconv.studies.table2 import refit_rows
 
-        rows = refit_rows(every_metric(exposure))
+        rows = refit_rows(options.every_metric(exposure))
         title = "Closed forms: coefficients and worst relative error"
         minor = ["formula", "worst_printed", "printed"]
     elif compare:
@@ -115,7 +103,6 @@ def _sweep(sweep: str | None, m_b: list[float] | None) -> tuple[Array, Array]:
     """Return m_B and the limit of β for the paper's rows, a sweep or chosen values."""
     import numpy as np
 
-    from mdfconv.distributions import distribution
     from mdfconv.studies.table2 import angle_limit, paper_sweep
 
     if sweep and m_b:

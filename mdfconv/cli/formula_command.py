@@ -2,71 +2,46 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import (
-    ExposureOption,
-    FixedGammaOption,
-    FormatOption,
-    FromOption,
-    MetricOption,
-    SpecularOption,
-    ToOption,
-    chosen_metric,
-    fixed_gamma,
-    noted,
-    refuse_given,
-)
+from mdfconv.cli import completion, options
+from mdfconv.cli.options import flag, option
 from mdfconv.cli.tables import write_table
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
-
-if TYPE_CHECKING:
-    from mdfconv.formula import SearchProblem
 
 _COLUMNS = ("operations", "worst_error", "formula")
 
 
 def command(
     context: typer.Context,
-    source: FromOption,
-    target: ToOption,
+    source: options.FromOption,
+    target: options.ToOption,
     tolerance: Annotated[
-        float,
-        typer.Option(metavar="T", help="Worst relative error against the fit that is accepted."),
+        float, option("T", "Worst relative error against the fit that is accepted.")
     ] = 0.01,
     range_: Annotated[
         str | None,
-        typer.Option(
-            "--range",
-            metavar="LO:HI",
-            help="Values of the source; by default alpha 0.01:0.8, roughness and glossiness "
+        option(
+            "LO:HI",
+            "Values of the source; by default alpha 0.01:0.8, roughness and glossiness "
             "0.1:0.9, exponents 1:10000.",
+            "--range",
         ),
     ] = None,
-    metric: MetricOption = "environment",
-    exposure: ExposureOption = None,
-    gamma: FixedGammaOption = None,
-    specular: SpecularOption = None,
+    metric: options.MetricOption = "environment",
+    exposure: options.ExposureOption = None,
+    gamma: options.FixedGammaOption = None,
+    specular: options.SpecularOption = None,
     language: Annotated[
-        str,
-        typer.Option(
-            "--lang",
-            metavar="LANG",
-            autocompletion=completion.languages,
-            help="glsl, hlsl, c, python or latex.",
-        ),
+        str, option("LANG", "glsl, hlsl, c, python or latex.", "--lang", words=completion.languages)
     ] = "glsl",
     every: Annotated[
-        bool,
-        typer.Option(
-            "--all", help="Print the table of cost against error instead, in that language."
-        ),
+        bool, flag("--all", "Print the table of cost against error instead, in that language.")
     ] = False,
-    format_: FormatOption = None,
+    format_: options.FormatOption = None,
 ) -> None:
     """Print the cheapest formula for a conversion, to paste into a shader or an importer.
 
@@ -85,45 +60,40 @@ def command(
     mdfconv formula --from blinn-phong --to ggx --metric energy --all --lang latex
     """
     from mdfconv.distributions.endpoint import endpoints, with_specular
-    from mdfconv.formula import LANGUAGES, SearchProblem, cheapest, write_formula
+    from mdfconv.formula import LANGUAGES, SearchProblem, cheapest, pareto_front, write_formula
 
     if every:
-        refuse_given(context, ["tolerance"], "does not go with --all, which has every error")
+        options.refuse_given(
+            context, ["tolerance"], "does not go with --all, which has every error"
+        )
     else:
-        refuse_given(
+        options.refuse_given(
             context, ["format_"], "is the form of the table of --all: a formula has --lang"
         )
-    LANGUAGES[language]  # names are wrong more often than ranges
-    first, last = endpoints(*with_specular(source, target, specular), fixed_gamma(gamma))
-    ends = noted(first), noted(last)
+    chosen_language = LANGUAGES[language]  # names are wrong more often than ranges
+    first, last = endpoints(*with_specular(source, target, specular), options.fixed_gamma(gamma))
+    ends = options.noted(first), options.noted(last)
     low, high = ends[0].stored.typical if range_ is None else _range(range_)
-    problem = SearchProblem(*ends, chosen_metric(metric, exposure), low, high)
+    problem = SearchProblem(*ends, options.chosen_metric(metric, exposure), low, high)
     if every:
         title = f"Formulas from {ends[0].label} to {ends[1].label}, {low:g} to {high:g}"
-        write_table(_COLUMNS, _rows(problem, language), format_, title=title)
+        rows = [
+            {
+                "operations": formula.shape.operations,
+                "worst_error": float(f"{formula.error:.3g}"),
+                "formula": chosen_language.one_line(formula, problem),
+            }
+            for formula in pareto_front(problem)
+        ]
+        write_table(_COLUMNS, rows, format_, title=title)
     else:
         typer.echo(write_formula(cheapest(problem, tolerance), problem, language))
 
 
 def _range(text: str) -> tuple[float, float]:
-    low, colon, high = text.partition(":")
     try:
-        ends = float(low), float(high)
+        low, high = map(float, text.split(":"))
     except ValueError:
-        colon = ""
-    if not colon:
-        raise MdfconvError(f"--range is LO:HI, two numbers, not '{text}'", percent_hint(text, ":"))
-    return ends
-
-
-def _rows(problem: SearchProblem, language: str) -> list[dict[str, Any]]:
-    from mdfconv.formula import LANGUAGES, pareto_front
-
-    return [
-        {
-            "operations": formula.shape.operations,
-            "worst_error": float(f"{formula.error:.3g}"),
-            "formula": LANGUAGES[language].one_line(formula, problem),
-        }
-        for formula in pareto_front(problem)
-    ]
+        reason = f"--range is LO:HI, two numbers, not '{text}'"
+        raise MdfconvError(reason, percent_hint(text, ":")) from None
+    return low, high

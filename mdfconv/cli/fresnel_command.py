@@ -4,24 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
-from mdfconv.cli.options import ForceOption, FormatOption, OutputOption, PngOption
+from mdfconv.cli.options import ForceOption, FormatOption, OutputOption, PngOption, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 
 
 def command(
     ior: Annotated[
-        float,
-        typer.Option(metavar="N", help="Relative index of refraction, 0.25 to 4, not near 1."),
+        float, option("N", "Relative index of refraction, 0.25 to 4, not near 1.")
     ] = 1.4,
-    mu: Annotated[
-        float, typer.Option(metavar="M", help="Mean of the weight in l.h = 2 (l.H)^2, 0 to 2.")
-    ] = 0.55,
-    sigma: Annotated[
-        float, typer.Option(metavar="S", help="Standard deviation of the weight.")
-    ] = 0.12,
+    mu: Annotated[float, option("M", "Mean of the weight in l.h = 2 (l.H)^2, 0 to 2.")] = 0.55,
+    sigma: Annotated[float, option("S", "Standard deviation of the weight.")] = 0.12,
     format_: FormatOption = None,
     output: OutputOption = None,
     png: PngOption = None,

@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import (
-    ForceOption,
-    FormatOption,
-    OutputOption,
-    PngOption,
-    refuse_given,
-)
+from mdfconv.cli import completion, options
+from mdfconv.cli.options import argument, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 from mdfconv.errors import MdfconvError
-
-if TYPE_CHECKING:
-    from mdfconv.distributions.evaluation import Array
-    from mdfconv.studies.furnace import FurnaceModel
 
 _MOST_POINTS = 1001
 _MOST_SAMPLES = 10_000_000
@@ -31,48 +21,43 @@ _MOST_DIRECTIONS = 100_000_000
 def command(
     context: typer.Context,
     parameter: Annotated[
-        float,
-        typer.Argument(metavar="PARAMETER", help="Exponent of the Phong BRDFs, α of the others."),
+        float, argument("PARAMETER", "Exponent of the Phong BRDFs, α of the others.")
     ],
     brdf: Annotated[
         str,
-        typer.Option(
-            metavar="BRDF",
-            autocompletion=completion.furnace_brdfs,
-            help="phong, modified-phong, ggx, beckmann, smoothie, smoothie-approx or "
+        option(
+            "BRDF",
+            "phong, modified-phong, ggx, beckmann, smoothie, smoothie-approx or "
             "ashikhmin-shirley; ggx:roughness takes PARAMETER for a stored form of α.",
+            words=completion.furnace_brdfs,
         ),
     ] = "ggx",
     normalizer: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME",
-            autocompletion=completion.normalizers,
-            help="Of modified-phong: usual (the default), arvo (integer exponents) or "
-            "mallett-yuksel.",
+        option(
+            "NAME",
+            "Of modified-phong: usual (the default), arvo (integer exponents) or mallett-yuksel.",
+            words=completion.normalizers,
         ),
     ] = None,
     masking: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "G",
+            "Of ggx and beckmann: correlated (the default), separable, v-cavity, ksk or none.",
             "--g",
-            metavar="G",
-            autocompletion=completion.maskings,
-            help="Of ggx and beckmann: correlated (the default), separable, v-cavity, ksk or none.",
+            words=completion.maskings,
         ),
     ] = None,
-    points: Annotated[
-        int, typer.Option(metavar="N", help="Cosines of the viewer, from 0 to 1.")
-    ] = 21,
+    points: Annotated[int, option("N", "Cosines of the viewer, from 0 to 1.")] = 21,
     samples: Annotated[
-        int | None,
-        typer.Option("--mc", metavar="N", help="Estimate by N random directions a cosine, too."),
+        int | None, option("N", "Estimate by N random directions a cosine, too.", "--mc")
     ] = None,
-    seed: Annotated[int, typer.Option(metavar="S", help="Of the random numbers.")] = 0,
-    png: PngOption = None,
-    format_: FormatOption = None,
-    output: OutputOption = None,
-    force: ForceOption = False,
+    seed: Annotated[int, option("S", "Of the random numbers.")] = 0,
+    png: options.PngOption = None,
+    format_: options.FormatOption = None,
+    output: options.OutputOption = None,
+    force: options.ForceOption = False,
 ) -> None:
     """Put a BRDF that absorbs nothing into a white furnace: how much light comes back.
 
@@ -90,10 +75,11 @@ def command(
     """
     import numpy as np
 
-    from mdfconv.studies.furnace import furnace_model
+    from mdfconv.output.records import rounded_rows
+    from mdfconv.studies import furnace
 
     if samples is None:
-        refuse_given(context, ["seed"], "goes with --mc")
+        options.refuse_given(context, ["seed"], "goes with --mc")
     if not 2 <= points <= _MOST_POINTS:
         raise MdfconvError(f"--points is from 2 to {_MOST_POINTS}")
     if samples is not None and not 2 <= samples <= _MOST_SAMPLES:
@@ -106,8 +92,14 @@ def command(
         raise MdfconvError(f"--seed is at least 0, not {seed}")
     outputs = Outputs(png, table=output, force=force)
     name, decoded = _decoded(brdf, parameter)
-    model = furnace_model(name, decoded, normalizer=normalizer, masking=masking)
-    rows = _rows(model, np.linspace(0, 1, points), samples, seed)
+    model = furnace.furnace_model(name, decoded, normalizer=normalizer, masking=masking)
+    cosine = np.linspace(0, 1, points)
+    columns = {"cos_theta": cosine, "albedo": furnace.directional_albedo(model, cosine)}
+    if samples:
+        columns["sampled"], columns["standard_error"] = furnace.sampled_albedo(
+            model, cosine, samples, seed
+        )
+    rows = rounded_rows(columns)
     label = f"{brdf} {parameter:g}"
     picture = {}
     if png:
@@ -131,15 +123,3 @@ def _decoded(brdf: str, value: float) -> tuple[str, float]:
     if not owner:
         raise MdfconvError(f"the exponent of {name} has no stored form", f"did you mean {name}?")
     return name, endpoint(f"{owner}:{form}").decode_one(value)
-
-
-def _rows(
-    model: FurnaceModel, cosine: Array, samples: int | None, seed: int
-) -> list[dict[str, Any]]:
-    from mdfconv.output.records import rounded_rows
-    from mdfconv.studies.furnace import directional_albedo, sampled_albedo
-
-    columns = {"cos_theta": cosine, "albedo": directional_albedo(model, cosine)}
-    if samples:
-        columns["sampled"], columns["standard_error"] = sampled_albedo(model, cosine, samples, seed)
-    return rounded_rows(columns)

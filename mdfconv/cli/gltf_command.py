@@ -2,101 +2,65 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.material_files import (
-    InPlaceOption,
-    MaterialReport,
-    ReportFormat,
-    ReportFormatOption,
-    ResultOption,
-    about,
-    convert_files,
-)
-from mdfconv.cli.options import (
-    ExposureOption,
-    ForceOption,
-    MetricOption,
-    SpecularOption,
-    chosen_metric,
-    refuse_given,
-)
+from mdfconv.cli import completion, material_files, options
+from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from mdfconv.distributions.endpoint import Endpoint
-    from mdfconv.scene.gltf.asset import GltfConversion
-    from mdfconv.scene.material_files import Destination
 
 _HEADINGS = {
     "index": "#", "name": "material", "value": "was", "result": "is", "rmse": "RMSE",
     "notes": "notes",
 }  # fmt: skip
-_KEYS = (
-    "file", "output", "from", "to", "metric", "count", "materials", "textures", "problems",
-)  # fmt: skip
 
 
 def command(
     context: typer.Context,
     files: Annotated[
-        list[str],
-        typer.Argument(metavar="IN.glb...", help="glTF or GLB files, or patterns such as '*.glb'."),
+        list[str], argument("IN.glb...", "glTF or GLB files, or patterns such as '*.glb'.")
     ],
-    output: ResultOption = None,
+    output: material_files.ResultOption = None,
     source: Annotated[
         str | None,
-        typer.Option(
-            "--from",
-            metavar="MDF:PROGRAM",
-            autocompletion=completion.endpoints,
-            help="What the program that wrote the file stored, such as blinn-phong:obj2gltf "
+        option(
+            "MDF:PROGRAM",
+            "What the program that wrote the file stored, such as blinn-phong:obj2gltf "
             "(mdfconv list --encodings has all).",
+            "--from",
+            words=completion.endpoints,
         ),
     ] = None,
     target: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "MDF:ENCODING",
+            "What the factors become; if not given ggx:roughness, as glTF defines them.",
             "--to",
-            metavar="MDF:ENCODING",
-            autocompletion=completion.endpoints,
-            help="What the factors become; if not given ggx:roughness, as glTF defines them.",
+            words=completion.endpoints,
         ),
     ] = None,
-    metric: MetricOption = "environment",
-    exposure: ExposureOption = None,
-    specular: SpecularOption = None,
-    in_place: InPlaceOption = False,
-    force: ForceOption = False,
+    metric: options.MetricOption = "environment",
+    exposure: options.ExposureOption = None,
+    specular: options.SpecularOption = None,
+    in_place: material_files.InPlaceOption = False,
+    force: options.ForceOption = False,
     textures: Annotated[
-        bool,
-        typer.Option(
-            "--textures", help="Convert roughness textures, too, each with the factor before it."
-        ),
+        bool, flag("--textures", "Convert roughness textures, too, each with the factor before it.")
     ] = False,
     lossy: Annotated[
-        bool,
-        typer.Option("--lossy", help="Take JPEG textures, although altered; they become PNG."),
+        bool, flag("--lossy", "Take JPEG textures, although altered; they become PNG.")
     ] = False,
     guess: Annotated[
-        bool,
-        typer.Option(
-            "--guess", help="Only propose --from by the file's asset.generator; write nothing."
-        ),
+        bool, flag("--guess", "Only propose --from by the file's asset.generator; write nothing.")
     ] = False,
     compare: Annotated[
-        bool,
-        typer.Option(
-            "--compare", help="Add what importers' rules make of the exponents, and their error."
-        ),
+        bool, flag("--compare", "Add what importers' rules make of the exponents, and their error.")
     ] = False,
-    format_: ReportFormatOption = ReportFormat.table,
+    format_: material_files.ReportFormatOption = "table",
 ) -> None:
     """Repair the roughness factors of glTF 2.0 files whose writer had exponents.
 
@@ -115,48 +79,57 @@ def command(
     mdfconv gltf lamp.gltf -o new.gltf --from blinn-phong:assimp-gltf --specular 0.5 --compare
     """
     from mdfconv.distributions.endpoint import with_specular
-    from mdfconv.scene.gltf.asset import convert_gltf, factor_endpoints
+    from mdfconv.scene.gltf.asset import GltfConversion, convert_gltf, factor_endpoints
     from mdfconv.scene.gltf.images import GltfTextures
+    from mdfconv.scene.material_files import Destination
     from mdfconv.scene.shininess import ROUGHNESS, SHININESS
     from mdfconv.scene.stored import ProblemKind
 
     if guess:
         others = {option.name for option in context.command.params if option.name}
         others -= {"files", "guess"}
-        refuse_given(context, others, "does not go with --guess, which only proposes --from")
+        options.refuse_given(
+            context, others, "does not go with --guess, which only proposes --from"
+        )
         _propose(files)
         return
     if not textures:
-        refuse_given(context, ["lossy"], "goes with --textures")
+        options.refuse_given(context, ["lossy"], "goes with --textures")
     if source is None:
         raise MdfconvError(
             "the rule by which the factors were stored is missing: give --from",
             "--guess proposes one",
         )
-    chosen = chosen_metric(metric, exposure)
+    chosen = options.chosen_metric(metric, exposure)
     names = with_specular(source, target or ROUGHNESS, specular)
     # A mistake in the names is none of a file.
     pair = factor_endpoints(*names)
+    dialect = pair[0].encoding.name.partition(":")[0] if pair[0].encoding else ""
     if compare and pair[0].distribution.name != SHININESS:
         raise MdfconvError(f"--compare is about exponents, {pair[0].label} stores none")
 
     def convert(destination: Destination, data: bytes) -> GltfConversion:
-        _check_form(destination, data)
+        _check_form(destination.source, destination.output, data)
         folders = GltfTextures(destination.source.parent, destination.output.parent, lossy)
-        with about(destination.source):
+        with material_files.about(destination.source):
             conversion = convert_gltf(
                 data, *pair, metric=chosen, textures=folders if textures else None
             )
-        _tell_other_generator(destination.source, conversion.generator, pair[0])
+        proposals = _proposals(conversion.generator)
+        if proposals and dialect not in proposals:
+            tell(
+                f"note: {destination.source} was written by '{conversion.generator}', which stands "
+                f"for {' or '.join(proposals.values())}"
+            )
         return conversion
 
-    report = MaterialReport(
+    report = material_files.MaterialReport(
         form=format_,
         metric=chosen,
-        keys=_KEYS,
         details=lambda conversion: {
             "from": names[0],
             "to": names[1],
+            "count": len(conversion.materials),
             "textures": list(map(str, conversion.files)),
         },
         headings=_HEADINGS,
@@ -164,31 +137,22 @@ def command(
         remedies={ProblemKind.TEXTURE: ": --textures converts it", ProblemKind.LOSSY: " (--lossy)"},
         exponent="parameter" if compare else "",
     )
-    convert_files(context, files, output, convert, report, in_place=in_place, force=force)
+    material_files.convert_files(
+        context, files, output, convert, report, in_place=in_place, force=force
+    )
 
 
-def _check_form(destination: Destination, data: bytes) -> None:
+def _check_form(source: Path, output: Path, data: bytes) -> None:
     """Refuse a name that says of a file that it is of the other form, which it does not become."""
     from mdfconv.scene.gltf.document import is_glb
 
     form = ".glb" if is_glb(data) else ".gltf"
-    named = destination.output.suffix.lower()
-    renamed = destination.output.name != destination.source.name
-    if renamed and named in {".glb", ".gltf"} - {form}:
+    named = output.suffix.lower()
+    if output.name != source.name and named in {".glb", ".gltf"} - {form}:
         raise MdfconvError(
-            f"{destination.source} stays {form[1:]} in its form, {destination.output} says "
-            f"{named[1:]}",
-            f"name it {destination.output.with_suffix(form)}",
+            f"{source} stays {form[1:]} in its form, {output} says {named[1:]}",
+            f"name it {output.with_suffix(form)}",
         )
-
-
-def _tell_other_generator(path: Path, generator: str, source: Endpoint) -> None:
-    """Say that a file names a program that stores another number than the user said."""
-    proposals = _proposals(generator)
-    asked = source.encoding.name.partition(":")[0] if source.encoding else ""
-    if proposals and asked not in proposals:
-        options = " or ".join(proposals.values())
-        tell(f"note: {path} was written by '{generator}', which stands for {options}")
 
 
 def _proposals(generator: str) -> dict[str, str]:
@@ -199,9 +163,8 @@ def _proposals(generator: str) -> dict[str, str]:
     proposals = {}
     for dialect in dialects_by_generator(generator):
         needed = " --specular L" if dialect.specular is Specular.needed else ""
-        provided = f" {dialect.provided}" if dialect.provided else ""
-        option = f"--from {dialect.owners[0]}:{dialect.name}{needed}{provided}"
-        proposals[dialect.name] = option
+        option = f"--from {dialect.owners[0]}:{dialect.name}{needed} {dialect.provided}"
+        proposals[dialect.name] = option.rstrip()
     return proposals
 
 
@@ -213,7 +176,7 @@ def _propose(files: list[str]) -> None:
 
     lines = []
     for path in find_files(files):
-        with about(path):
+        with material_files.about(path):
             generator = generator_of(read_file(path))
         proposals = _proposals(generator).values()
         said = f"asset.generator is '{generator}'" if generator else "no asset.generator"

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli.options import ForceOption, Format, FormatOption, PngOption
+from mdfconv.cli.options import ForceOption, FormatOption, PngOption, argument, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import console, form_of, write_table
@@ -19,20 +19,12 @@ _ROUGHNESSES = (0.05, 0.1, 0.2, 0.4)
 def command(
     map_: Annotated[
         Path,
-        typer.Argument(
-            metavar="MAP",
-            help="Environment map, linear, 2:1: OpenEXR, Radiance .hdr or another picture.",
-        ),
+        argument("MAP", "Environment map, linear, 2:1: OpenEXR, Radiance .hdr or another picture."),
     ],
     m_b: Annotated[
-        list[float] | None,
-        typer.Option(
-            "--m-b", metavar="M", help="Beckmann's m_B; repeatable; by default 0.05 to 0.4."
-        ),
+        list[float] | None, option("M", "Beckmann's m_B; repeatable; by default 0.05 to 0.4.")
     ] = None,
-    spectrum: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="Write the spectrum as CSV.")
-    ] = None,
+    spectrum: Annotated[Path | None, option("FILE", "Write the spectrum as CSV.", "--csv")] = None,
     png: PngOption = None,
     force: ForceOption = False,
     format_: FormatOption = None,
@@ -64,11 +56,11 @@ def command(
         contents[png] = draw_spectrum(report.spectrum, map_.name)
     outputs.write(contents)
     form = form_of(format_)
-    if form is Format.json:
+    if form == "json":
         light = {"exponent": report.spectrum.exponent, "softness": report.softness}
         lists = {"conversions": rows, "spectrum": degrees}
         typer.echo(json_text({"map": str(map_), **light, **lists}))
         return
     write_table(list(rows[0]), rows, form, title="α of the best GGX for Beckmann's m_B")
-    say = console().print if form is Format.table else tell
+    say = console().print if form == "table" else tell
     say(report.sentence)

@@ -5,15 +5,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-import typer
-
-from mdfconv.cli.options import (
-    ExposureOption,
-    Format,
-    FormatOption,
-    OptionalMetricOption,
-    asked_metric,
-)
+from mdfconv.cli import options
+from mdfconv.cli.options import flag
 from mdfconv.cli.tables import console, form_of, print_table, write_table
 from mdfconv.distributions import Distribution, list_distributions
 from mdfconv.distributions.endpoint import forms_of
@@ -32,14 +25,11 @@ _FOOTNOTE = (
 
 def command(
     encodings: Annotated[
-        bool,
-        typer.Option(
-            "--encodings", help="List what follows a colon: how files and programs store it."
-        ),
+        bool, flag("--encodings", "List what follows a colon: how files and programs store it.")
     ] = False,
-    metric: OptionalMetricOption = None,
-    exposure: ExposureOption = None,
-    format_: FormatOption = None,
+    metric: options.OptionalMetricOption = None,
+    exposure: options.ExposureOption = None,
+    format_: options.FormatOption = None,
 ) -> None:
     """List the distributions, or the forms in which files and programs store their parameters.
 
@@ -55,27 +45,27 @@ def command(
     mdfconv list --encodings --format json
     """
     if encodings:
-        _list_encodings(asked_metric(metric, exposure) or metric_named(_NATURAL), format_)
+        _list_encodings(options.asked_metric(metric, exposure) or metric_named(_NATURAL), format_)
         return
     if metric is not None or exposure is not None:
         raise MdfconvError("--metric is of --encodings")
-    form = form_of(format_, in_pipe=Format.plain)
-    if form is Format.table:
+    form = form_of(format_, in_pipe="plain")
+    if form == "table":
         rows = [_row(mdf) for mdf in list_distributions()]
         print_table(list(rows[0]), rows)
     else:
         records = [_record(mdf) for mdf in list_distributions()]
-        write_table(["name"] if form is Format.plain else list(records[0]), records, form)
+        write_table(["name"] if form == "plain" else list(records[0]), records, form)
 
 
-def _list_encodings(metric: Metric, format_: Format | None) -> None:
+def _list_encodings(metric: Metric, format_: options.Format | None) -> None:
     """Print the table of encodings and dialects."""
     from mdfconv.scene.shininess import EXPONENTS, encoding_records
 
     form = form_of(format_)
     records = encoding_records(metric)
-    if form is not Format.table:
-        write_table(["encoding"] if form is Format.plain else list(records[0]), records, form)
+    if form != "table":
+        write_table(["encoding"] if form == "plain" else list(records[0]), records, form)
         return
     rows = [
         {

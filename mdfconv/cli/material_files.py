@@ -7,13 +7,13 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from enum import StrEnum
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from mdfconv.cli.options import flag, option
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import ROWS_SHOWN, print_table
 from mdfconv.errors import MdfconvError
@@ -29,27 +29,21 @@ Rows = list[dict[str, Any]]
 # Two milliseconds a row: of a hundred thousand materials the report is not to take the time.
 MATERIALS_SHOWN = 100
 _JSON = "--format json"
+# What JSON has of a file, in this order.
+_KEYS = (
+    "file", "output", "from", "to", "target", "metric", "count", "materials", "textures",
+    "includes", "problems", "notes",
+)  # fmt: skip
 
 
-class ReportFormat(StrEnum):
-    """The forms of the report on what was converted."""
-
-    table = "table"
-    json = "json"
-
-
+# The forms of the report on what was converted.
+ReportFormat = Literal["table", "json"]
 ResultOption = Annotated[
     str | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="OUT",
-        help="File, or a folder: one that exists, or out/ with a slash.",
-    ),
+    option("OUT", "File, or a folder: one that exists, or out/ with a slash.", "--output", "-o"),
 ]
 InPlaceOption = Annotated[
-    bool,
-    typer.Option("--in-place", help="Change the file itself; the original is kept as .bak."),
+    bool, flag("--in-place", "Change the file itself; the original is kept as .bak.")
 ]
 ReportFormatOption = Annotated[
     ReportFormat,
@@ -67,11 +61,8 @@ class MaterialReport:
         A table, or JSON.
     metric : Metric
         What the conversions keep.
-    keys : sequence of str
-        What JSON has of a file, in order: of ``file``, ``output``, ``metric``, ``count``,
-        ``materials``, ``problems``, ``notes``, and of the details.
     details : callable
-        From a conversion to what only this command has of it, by key.
+        From a conversion to what not every command has of it, by key.
     headings : mapping of str to str
         The fields of a material that the table shows, where there are such, and their headings.
     secondary : sequence of str
@@ -91,7 +82,6 @@ class MaterialReport:
 
     form: ReportFormat
     metric: Metric
-    keys: Sequence[str]
     details: Callable[[Any], dict[str, Any]]
     headings: Mapping[str, str]
     secondary: Sequence[str] = ()
@@ -103,7 +93,7 @@ class MaterialReport:
 
     def print(self, converted: Sequence[tuple[Destination, FileConversion]]) -> None:
         """Print JSON of all to standard output, or tables to standard error."""
-        if self.form is ReportFormat.json:
+        if self.form == "json":
             typer.echo(json_text([self._record(*file) for file in converted]))
             return
         for destination, conversion in converted:
@@ -116,7 +106,7 @@ class MaterialReport:
     def _record(self, destination: Destination, conversion: FileConversion) -> dict[str, Any]:
         """Return what is said of a file: of all materials, or of those that a table shows."""
         shown = conversion.materials
-        if self.form is ReportFormat.table:
+        if self.form == "table":
             shown = shown[:MATERIALS_SHOWN]
         rows = [vars(material) | {"notes": list(material.notes)} for material in shown]
         if self.compare:
@@ -127,15 +117,13 @@ class MaterialReport:
             "file": str(destination.source),
             "output": str(destination.output),
             "metric": str(self.metric),
-            "count": len(conversion.materials),
             "materials": rows,
             "problems": [
                 {self.place: problem.place, "problem": self.problem_text(problem)}
                 for problem in conversion.problems
             ],
-            "notes": [{"line": line, "note": text} for line, text in conversion.notes],
         } | self.details(conversion)
-        return {key: known[key] for key in self.keys}
+        return {key: known[key] for key in _KEYS if key in known}
 
     def _add_importers(self, rows: Rows) -> None:
         """Add what importers make of the exponents, to all rows or to those that are shown."""
@@ -146,7 +134,7 @@ class MaterialReport:
         for row in rows:
             row["importers"] = {}
         known = [row for row in rows if math.isfinite(row[self.exponent])]
-        if self.form is ReportFormat.table:
+        if self.form == "table":
             known = known[: ROWS_SHOWN // len(IMPORTERS)]
         exponents = np.array([row[self.exponent] for row in known])
         for row, results in zip(known, importer_results(exponents, self.metric), strict=True):

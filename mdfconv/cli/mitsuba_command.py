@@ -3,67 +3,42 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Sequence
+from typing import Annotated, Any
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.material_files import (
-    InPlaceOption,
-    MaterialReport,
-    ReportFormat,
-    ReportFormatOption,
-    ResultOption,
-    Rows,
-    about,
-    convert_files,
-)
-from mdfconv.cli.options import ExposureOption, ForceOption, MetricOption, chosen_metric
+from mdfconv.cli import completion, material_files, options
+from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.process import tell
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from mdfconv.scene.material_files import Destination
-    from mdfconv.scene.mitsuba.convert import MitsubaConversion, MitsubaMaterial
 
 _HEADINGS = {
     "name": "BSDF", "line": "line", "distribution": "from", "value": "α", "result": "new α",
     "rmse": "RMSE", "rmse_unchanged": "kept", "notes": "notes",
 }  # fmt: skip
-_KEYS = (
-    "file", "output", "target", "metric", "materials", "textures", "includes", "problems",
-)  # fmt: skip
 
 
 def command(
     context: typer.Context,
-    scenes: Annotated[
-        list[str],
-        typer.Argument(metavar="IN.xml...", help="Scenes, or patterns such as '*.xml'."),
-    ],
-    output: ResultOption = None,
+    scenes: Annotated[list[str], argument("IN.xml...", "Scenes, or patterns such as '*.xml'.")],
+    output: material_files.ResultOption = None,
     to: Annotated[
         str,
-        typer.Option(
-            metavar="MDF",
-            autocompletion=completion.mitsuba_targets,
-            help="Distribution to convert to: ggx or beckmann.",
+        option(
+            "MDF", "Distribution to convert to: ggx or beckmann.", words=completion.mitsuba_targets
         ),
     ] = "ggx",
-    metric: MetricOption = "environment",
-    exposure: ExposureOption = None,
-    in_place: InPlaceOption = False,
-    force: ForceOption = False,
+    metric: options.MetricOption = "environment",
+    exposure: options.ExposureOption = None,
+    in_place: material_files.InPlaceOption = False,
+    force: options.ForceOption = False,
     textures: Annotated[
-        bool,
-        typer.Option("--textures", help="Convert the bitmaps of alpha, too, beside the result."),
+        bool, flag("--textures", "Convert the bitmaps of alpha, too, beside the result.")
     ] = False,
     compare: Annotated[
-        bool,
-        typer.Option("--compare", help="Add what is left if alpha is kept: its error."),
+        bool, flag("--compare", "Add what is left if alpha is kept: its error.")
     ] = False,
-    format_: ReportFormatOption = ReportFormat.table,
+    format_: material_files.ReportFormatOption = "table",
 ) -> None:
     """Convert the distribution of rough BSDFs in Mitsuba scenes (0.6 and 3).
 
@@ -79,14 +54,14 @@ def command(
 
     mdfconv mitsuba scene.xml -o out --textures --compare --format json
     """
-    from mdfconv.scene.material_files import TextureFolder
-    from mdfconv.scene.mitsuba.convert import check_target, convert_mitsuba, unchanged_errors
+    from mdfconv.scene.material_files import Destination, TextureFolder
+    from mdfconv.scene.mitsuba import convert as mitsuba
     from mdfconv.scene.texture.rule import TextureRule
 
-    target = check_target(to)
-    chosen = chosen_metric(metric, exposure)
+    target = mitsuba.check_target(to)
+    chosen = options.chosen_metric(metric, exposure)
 
-    def convert(destination: Destination, data: bytes) -> MitsubaConversion:
+    def convert(destination: Destination, data: bytes) -> mitsuba.MitsubaConversion:
         folder = TextureFolder(destination.source, destination.output)
 
         def texture(file: str, distribution: str) -> str:
@@ -94,8 +69,8 @@ def command(
                 file, TextureRule(distribution, target, metric=str(chosen)), target
             )
 
-        with about(destination.source):
-            conversion = convert_mitsuba(
+        with material_files.about(destination.source):
+            conversion = mitsuba.convert_mitsuba(
                 data, target, metric=chosen, texture=texture if textures else None
             )
         # A texture whose BSDF is left for another reason is not written.
@@ -103,15 +78,16 @@ def command(
         files = {path: data for path, data in folder.files.items() if path.name in names}
         return dataclasses.replace(conversion, files=files, inputs=folder.inputs)
 
-    def add_unchanged_errors(materials: Sequence[MitsubaMaterial], rows: Rows) -> None:
-        errors = unchanged_errors(materials, target, chosen)
+    def add_unchanged_errors(
+        materials: Sequence[mitsuba.MitsubaMaterial], rows: material_files.Rows
+    ) -> None:
+        errors = mitsuba.unchanged_errors(materials, target, chosen)
         for row, error in zip(rows, errors, strict=True):
             row["rmse_unchanged"] = error
 
-    report = MaterialReport(
+    report = material_files.MaterialReport(
         form=format_,
         metric=chosen,
-        keys=_KEYS,
         details=lambda conversion: {
             "target": target,
             "textures": list(map(vars, conversion.textures)),
@@ -123,7 +99,9 @@ def command(
         compare=add_unchanged_errors if compare else None,
         print_more=_print_more,
     )
-    convert_files(context, scenes, output, convert, report, in_place=in_place, force=force)
+    material_files.convert_files(
+        context, scenes, output, convert, report, in_place=in_place, force=force
+    )
 
 
 def _print_more(record: dict[str, Any]) -> None:

@@ -3,34 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.material_files import (
-    InPlaceOption,
-    MaterialReport,
-    ReportFormat,
-    ReportFormatOption,
-    ResultOption,
-    about,
-    convert_files,
-)
-from mdfconv.cli.options import (
-    ExposureOption,
-    ForceOption,
-    MetricOption,
-    chosen_metric,
-    refuse_given,
-)
+from mdfconv.cli import completion, material_files, options
+from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.tables import progress
 from mdfconv.errors import MdfconvError
-
-if TYPE_CHECKING:
-    from mdfconv.scene.material_files import Destination
-    from mdfconv.scene.mtl.library import MtlConversion
-    from mdfconv.scene.stored import MaterialProblem
 
 _HEADINGS = {
     "name": "material", "shininess": "Ns", "roughness": "Pr", "rmse": "RMSE", "notes": "notes",
@@ -40,42 +20,33 @@ _HEADINGS = {
 def command(
     context: typer.Context,
     libraries: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="IN.mtl...", help="Material libraries, or patterns such as '*.mtl'."
-        ),
+        list[str], argument("IN.mtl...", "Material libraries, or patterns such as '*.mtl'.")
     ],
-    output: ResultOption = None,
+    output: material_files.ResultOption = None,
     to: Annotated[
         str,
-        typer.Option(
-            metavar="WHAT",
-            autocompletion=completion.mtl_targets,
-            help="roughness (Pr from Ns) or shininess (Ns from Pr, the inverse).",
+        option(
+            "WHAT",
+            "roughness (Pr from Ns) or shininess (Ns from Pr, the inverse).",
+            words=completion.mtl_targets,
         ),
     ] = "roughness",
-    metric: MetricOption = "environment",
-    exposure: ExposureOption = None,
-    replace: Annotated[
-        bool, typer.Option("--replace", help="Drop the statement that was converted.")
-    ] = False,
-    in_place: InPlaceOption = False,
-    force: ForceOption = False,
+    metric: options.MetricOption = "environment",
+    exposure: options.ExposureOption = None,
+    replace: Annotated[bool, flag("--replace", "Drop the statement that was converted.")] = False,
+    in_place: material_files.InPlaceOption = False,
+    force: options.ForceOption = False,
     textures: Annotated[
         bool,
-        typer.Option(
-            "--textures", help="Convert the textures of map_Ns, too, into map_Pr beside the result."
-        ),
+        flag("--textures", "Convert the textures of map_Ns, too, into map_Pr beside the result."),
     ] = False,
     exponent_max: Annotated[
-        float,
-        typer.Option(metavar="N", help="Exponent of a white texel in those textures."),
+        float, option("N", "Exponent of a white texel in those textures.")
     ] = 1000.0,
     compare: Annotated[
-        bool,
-        typer.Option("--compare", help="Add what importers' rules make of Ns, and their error."),
+        bool, flag("--compare", "Add what importers' rules make of Ns, and their error.")
     ] = False,
-    format_: ReportFormatOption = ReportFormat.table,
+    format_: material_files.ReportFormatOption = "table",
 ) -> None:
     """Convert the shininess of Wavefront material libraries to roughness, or back.
 
@@ -93,27 +64,29 @@ def command(
 
     mdfconv mtl --to shininess chair-pbr.mtl -o chair-phong.mtl
     """
-    from mdfconv.scene.material_files import TextureFolder
-    from mdfconv.scene.mtl.library import convert_library_textures, convert_mtl, texture_rule
-    from mdfconv.scene.stored import ProblemKind
+    from mdfconv.scene.material_files import Destination, TextureFolder
+    from mdfconv.scene.mtl import library
+    from mdfconv.scene.stored import MaterialProblem, ProblemKind
 
     to = to.strip().lower()
     if to != "roughness" and (compare or textures):
         raise MdfconvError("--compare and --textures go with --to roughness")
     if not textures:
-        refuse_given(context, ["exponent_max"], "goes with --textures")
-    chosen = chosen_metric(metric, exposure)
+        options.refuse_given(context, ["exponent_max"], "goes with --textures")
+    chosen = options.chosen_metric(metric, exposure)
     # A mistake in it is none of a library.
-    rule = texture_rule(chosen, exponent_max)
+    rule = library.texture_rule(chosen, exponent_max)
 
-    def convert(destination: Destination, data: bytes) -> MtlConversion:
+    def convert(destination: Destination, data: bytes) -> library.MtlConversion:
         folder = TextureFolder(destination.source, destination.output)
         names: dict[str, str] | None = None
         problems: list[MaterialProblem] = []
         if textures:
-            names, problems = convert_library_textures(data, folder, rule, progress)
-        with about(destination.source):
-            conversion = convert_mtl(data, to, metric=chosen, replace=replace, texture_names=names)
+            names, problems = library.convert_library_textures(data, folder, rule, progress)
+        with material_files.about(destination.source):
+            conversion = library.convert_mtl(
+                data, to, metric=chosen, replace=replace, texture_names=names
+            )
         return dataclasses.replace(
             conversion,
             files=folder.files,
@@ -121,13 +94,17 @@ def command(
             problems=(*problems, *conversion.problems),
         )
 
-    report = MaterialReport(
+    report = material_files.MaterialReport(
         form=format_,
         metric=chosen,
-        keys=["file", "output", "metric", "materials", "textures", "problems", "notes"],
-        details=lambda conversion: {"textures": list(map(vars, conversion.textures))},
+        details=lambda conversion: {
+            "textures": list(map(vars, conversion.textures)),
+            "notes": [{"line": line, "note": text} for line, text in conversion.notes],
+        },
         headings=_HEADINGS,
         remedies={ProblemKind.TEXTURE: ": --textures converts it"},
         exponent="shininess" if compare else "",
     )
-    convert_files(context, libraries, output, convert, report, in_place=in_place, force=force)
+    material_files.convert_files(
+        context, libraries, output, convert, report, in_place=in_place, force=force
+    )

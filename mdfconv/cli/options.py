@@ -4,98 +4,93 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from mdfconv.cli import completion
 from mdfconv.cli.process import tell
+from mdfconv.distributions.endpoint import Endpoint, one_parameter_endpoint
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 
 if TYPE_CHECKING:
     from mdfconv.conversion.values import Gamma
-    from mdfconv.distributions.endpoint import Endpoint
-    from mdfconv.fitting.metrics import Metric
 
 # Of a page a hundred million pixels, a third of a gigabyte.
 _LARGEST_DPI = 1200
+# The forms in which results are written.
+Format = Literal["table", "plain", "csv", "json", "markdown"]
 
 
-class Format(StrEnum):
-    """The forms in which results are written."""
+def option(metavar: str, help_: str, *names: str, words: Any = None, **more: Any) -> Any:
+    """Return a Typer option that takes a value, of which the shell completes some `words`.
 
-    table = "table"
-    plain = "plain"
-    csv = "csv"
-    json = "json"
-    markdown = "markdown"
+    Without names it has that of its parameter.
+    """
+    return typer.Option(*names, metavar=metavar, help=help_, autocompletion=words, **more)
+
+
+def flag(name: str, help_: str) -> Any:
+    """Return a Typer option that takes no value and has no ``--no-`` form."""
+    return typer.Option(name, help=help_)
+
+
+def argument(metavar: str, help_: str, **more: Any) -> Any:
+    """Return a Typer argument."""
+    return typer.Argument(metavar=metavar, help=help_, **more)
 
 
 FromOption = Annotated[
     str,
-    typer.Option(
-        "--from",
-        metavar="MDF",
-        autocompletion=completion.endpoints,
-        help="Distribution that the values belong to, such as beckmann, ggx or blinn-phong; "
+    option(
+        "MDF",
+        "Distribution that the values belong to, such as beckmann, ggx or blinn-phong; "
         "ggx:roughness and ggx:glossiness name stored forms of α, blinn-phong:reflected the older "
         "Phong exponent.",
+        "--from",
+        words=completion.endpoints,
     ),
 ]
 ToOption = Annotated[
     str,
-    typer.Option(
-        "--to",
-        metavar="MDF",
-        autocompletion=completion.targets,
-        help="Distribution to convert to, as for --from.",
-    ),
+    option("MDF", "Distribution to convert to, as for --from.", "--to", words=completion.targets),
 ]
 MethodOption = Annotated[
     str | None,
-    typer.Option(
-        "--method",
-        metavar="METHOD",
-        autocompletion=completion.methods,
-        help="closed-form (keeps the lobe's shape, approximately), half-angle, ward, peak, "
+    option(
+        "METHOD",
+        "closed-form (keeps the lobe's shape, approximately), half-angle, ward, peak, "
         "fit: exact, under the metric, or fast: the same from stored polynomials. With --metric "
         "alone the fit, by fast where that reaches.",
+        words=completion.methods,
     ),
 ]
-_METRIC = typer.Option(
-    "--metric",
-    metavar="METRIC",
-    autocompletion=completion.metrics,
-    help="What a fit keeps, and what errors are taken of: unit (the shape of the lobe), energy "
+_METRIC = option(
+    "METRIC",
+    "What a fit keeps, and what errors are taken of: unit (the shape of the lobe), energy "
     "(the light of the sun or a lamp), environment (the light of a natural environment), "
     "light:FILE (that of an environment map) or display (the picture on a screen).",
+    words=completion.metrics,
 )
 MetricOption = Annotated[str, _METRIC]
 OptionalMetricOption = Annotated[str | None, _METRIC]
 ExposureOption = Annotated[
     float | None,
-    typer.Option(
-        "--exposure",
-        metavar="E",
-        help="Exposure of the display metric; 1, if not given, puts the source's peak at white.",
+    option(
+        "E", "Exposure of the display metric; 1, if not given, puts the source's peak at white."
     ),
 ]
 _GAMMA_HELP = "Second parameter, of gtr and student-t; 2, which is ggx, if not given"
-GammaOption = Annotated[
-    str | None, typer.Option("--gamma", metavar="G", help=f"{_GAMMA_HELP}; free fits it.")
-]
-FixedGammaOption = Annotated[
-    str | None, typer.Option("--gamma", metavar="G", help=f"{_GAMMA_HELP}.")
-]
+GammaOption = Annotated[str | None, option("G", f"{_GAMMA_HELP}; free fits it.")]
+FixedGammaOption = Annotated[str | None, option("G", f"{_GAMMA_HELP}.")]
 SpecularOption = Annotated[
     float | None,
-    typer.Option(
-        "--specular",
-        metavar="L",
-        help="Weight of the specular lobe or luminance of Ks, above 0 to 1, where a program's rule "
+    option(
+        "L",
+        "Weight of the specular lobe or luminance of Ks, above 0 to 1, where a program's rule "
         "depends on it (mdfconv list --encodings).",
     ),
 ]
@@ -107,39 +102,31 @@ FormatOption = Annotated[
         "most easily, in a file what its name ends in.",
     ),
 ]
-OutputOption = Annotated[
-    Path | None,
-    typer.Option("--output", "-o", metavar="FILE", help="Write to a file instead."),
-]
+OutputOption = Annotated[Path | None, option("FILE", "Write to a file instead.", "--output", "-o")]
 FolderOption = Annotated[
     Path | None,
-    typer.Option(
+    option(
+        "DIR",
+        "Folder to write to, created if it is not there; by default ./reports.",
         "--output",
         "-o",
-        metavar="DIR",
-        help="Folder to write to, created if it is not there; by default ./reports.",
     ),
 ]
 ForceOption = Annotated[
-    bool, typer.Option("--force", help="Write over files that exist; else they are refused.")
+    bool, flag("--force", "Write over files that exist; else they are refused.")
 ]
-PngOption = Annotated[
-    Path | None, typer.Option("--png", metavar="FILE", help="Draw the result into a picture.")
-]
+PngOption = Annotated[Path | None, option("FILE", "Draw the result into a picture.")]
 DpiOption = Annotated[
-    int,
-    typer.Option(
-        "--dpi", metavar="N", min=10, max=_LARGEST_DPI, help="Resolution of pictures, dots an inch."
-    ),
+    int, option("N", "Resolution of pictures, dots an inch.", min=10, max=_LARGEST_DPI)
 ]
 
 
 def refuse_given(context: typer.Context, names: Collection[str], why: str) -> None:
     """Refuse options that would be ignored; `why` follows the option's name in the refusal."""
-    for option in context.command.params:
-        source = context.get_parameter_source(option.name or "")
-        if option.name in names and source is not None and source.name == "COMMANDLINE":
-            raise MdfconvError(f"{option.opts[0]} {why}")
+    for parameter in context.command.params:
+        source = context.get_parameter_source(parameter.name or "")
+        if parameter.name in names and source is not None and source.name == "COMMANDLINE":
+            raise MdfconvError(f"{parameter.opts[0]} {why}")
 
 
 def refuse_idle_metric(context: typer.Context, method: str | None) -> None:
@@ -153,8 +140,6 @@ def refuse_idle_metric(context: typer.Context, method: str | None) -> None:
 
 def chosen_metric(name: str, exposure: float | None = None) -> Metric:
     """Return the metric for the two options; refuse an exposure of a metric that has none."""
-    from mdfconv.fitting.metrics import metric_named
-
     if exposure is None:
         return metric_named(name)
     if metric_named(name).setting != "exposure":
@@ -166,8 +151,6 @@ def chosen_metric(name: str, exposure: float | None = None) -> Metric:
 
 def asked_metric(name: str | None, exposure: float | None) -> Metric | None:
     """Return the metric for the two options, None if neither is given."""
-    from mdfconv.fitting.metrics import list_metrics
-
     if name is None and exposure is None:
         return None
     return chosen_metric(list_metrics()[0] if name is None else name, exposure)
@@ -175,8 +158,6 @@ def asked_metric(name: str | None, exposure: float | None) -> Metric | None:
 
 def every_metric(exposure: float | None = None) -> list[Metric]:
     """Return all metrics, those that have an exposure with the one that was asked for."""
-    from mdfconv.fitting.metrics import list_metrics, metric_named
-
     return [
         chosen_metric(name, exposure if metric_named(name).setting == "exposure" else None)
         for name in list_metrics()
@@ -215,8 +196,6 @@ def noted(end: Endpoint) -> Endpoint:
 
 def asked_endpoint(name: str) -> Endpoint:
     """Return the distribution of one parameter, and its form, that an option names."""
-    from mdfconv.distributions.endpoint import one_parameter_endpoint
-
     return noted(one_parameter_endpoint(name))
 
 

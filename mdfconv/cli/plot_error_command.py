@@ -3,32 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import (
-    DpiOption,
-    ExposureOption,
-    FolderOption,
-    ForceOption,
-    FormatOption,
-    MethodOption,
-    OptionalMetricOption,
-    asked_endpoint,
-    asked_metric,
-    in_asked_forms,
-    refuse_given,
-)
+from mdfconv.cli import completion, options
+from mdfconv.cli.options import flag, option
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
 from mdfconv.cli.tables import write_table
 from mdfconv.distributions import one_parameter_distribution
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric
 from mdfconv.output.files import file_bytes
-
-if TYPE_CHECKING:
-    from mdfconv.fitting.metrics import Metric
 
 _REFERENCE = "beckmann"
 _COLUMNS = ("figure", "distribution", "parameter", "max_error_percent", "beta_rad")
@@ -37,38 +23,35 @@ _COLUMNS = ("figure", "distribution", "parameter", "max_error_percent", "beta_ra
 def command(
     context: typer.Context,
     m_b: Annotated[
-        list[float] | None,
-        typer.Option("--m-b", metavar="M", help="Beckmann's m_B; repeatable; default the paper's."),
+        list[float] | None, option("M", "Beckmann's m_B; repeatable; default the paper's.")
     ] = None,
-    method: MethodOption = None,
-    metric: OptionalMetricOption = None,
-    exposure: ExposureOption = None,
+    method: options.MethodOption = None,
+    metric: options.OptionalMetricOption = None,
+    exposure: options.ExposureOption = None,
     reference: Annotated[
         str,
-        typer.Option(
-            metavar="MDF",
-            autocompletion=completion.distributions,
-            help="Distribution that the errors are taken against.",
+        option(
+            "MDF", "Distribution that the errors are taken against.", words=completion.distributions
         ),
     ] = _REFERENCE,
     mdf: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="MDF",
-            autocompletion=completion.endpoints,
-            help="Only this distribution, or the form in which its parameter is printed, such as "
+        option(
+            "MDF",
+            "Only this distribution, or the form in which its parameter is printed, such as "
             "ggx:roughness; repeatable.",
+            words=completion.endpoints,
         ),
     ] = None,
-    output: FolderOption = None,
-    force: ForceOption = False,
+    output: options.FolderOption = None,
+    force: options.ForceOption = False,
     png: Annotated[bool, typer.Option("--png/--no-png", help="Write pictures.")] = True,
     csv: Annotated[bool, typer.Option("--csv/--no-csv", help="Write the errors.")] = True,
-    svg: Annotated[bool, typer.Option("--svg", help="Write pictures as SVG, too.")] = False,
-    dpi: DpiOption = 150,
-    points: Annotated[int, typer.Option(metavar="N", help="Angles a curve.")] = 1001,
-    log: Annotated[bool, typer.Option("--log", help="Logarithmic, for the tails.")] = False,
-    format_: FormatOption = None,
+    svg: Annotated[bool, flag("--svg", "Write pictures as SVG, too.")] = False,
+    dpi: options.DpiOption = 150,
+    points: Annotated[int, option("N", "Angles a curve.")] = 1001,
+    log: Annotated[bool, flag("--log", "Logarithmic, for the tails.")] = False,
+    format_: options.FormatOption = None,
 ) -> None:
     """Draw distributions and their error: Figures 1 and 2 of Sawicki 2021.
 
@@ -87,10 +70,10 @@ def command(
     from mdfconv.studies.error_curves import curves, draw_errors
 
     if not png and not svg:
-        refuse_given(context, ["dpi", "log"], "is of pictures: give no --no-png, or --svg")
-    chosen = asked_metric(metric, exposure)
+        options.refuse_given(context, ["dpi", "log"], "is of pictures: give no --no-png, or --svg")
+    chosen = options.asked_metric(metric, exposure)
     reference = one_parameter_distribution(reference).name
-    endpoints = [asked_endpoint(name) for name in mdf or ()]
+    endpoints = [options.asked_endpoint(name) for name in mdf or ()]
     names = [one.distribution.name for one in endpoints]
     sets = _parameter_sets(m_b, method, chosen, reference, names)
     forms = [*["png"] * png, *["svg"] * svg]
@@ -106,7 +89,9 @@ def command(
             contents[folder / f"{name}.{form}"] = picture
         if csv:
             contents[folder / f"{name}b.csv"] = file_bytes(drawn.error_text())
-        rows += [{"figure": name} | row for row in in_asked_forms(drawn.maxima(), endpoints)]
+        rows += [
+            {"figure": name} | row for row in options.in_asked_forms(drawn.maxima(), endpoints)
+        ]
     title = f"Largest error against {reference}"
     write_table(_COLUMNS, rows, format_, outputs, beside=contents, title=title)
 
@@ -122,23 +107,18 @@ def _parameter_sets(
     from mdfconv.render.comparison import DRAWN, PAPER_SETS
     from mdfconv.studies.error_curves import parameters_for
 
-    if m_b:
-        shown = dict.fromkeys([reference, *(names or (_REFERENCE, *DRAWN))])
-        sets = {
-            f"error-m_b-{value_name(value)}": parameters_for(value, list(shown), method, metric)
-            for value in m_b
-        }
-    elif method:
+    if method and not m_b:
         raise MdfconvError("--method converts an --m-b: give one")
-    else:
-        shown = dict.fromkeys([reference, *(names or PAPER_SETS["fig1"])])
-        for name in shown:
-            if name not in PAPER_SETS["fig1"]:
-                raise MdfconvError(f"the paper's figures have no {name}: give --m-b")
-        sets = {
-            figure: {name: printed[name] for name in shown}
-            for figure, printed in PAPER_SETS.items()
-        }
+    printed = PAPER_SETS["fig1"]
+    shown = list(dict.fromkeys([reference, *(names or ((_REFERENCE, *DRAWN) if m_b else printed))]))
+    missing = [name for name in shown if name not in printed]
+    if missing and not m_b:
+        raise MdfconvError(f"the paper's figures have no {missing[0]}: give --m-b")
     if len(shown) == 1:
         raise MdfconvError(f"{reference} is the reference: name another --mdf to compare with it")
-    return sets
+    if not m_b:
+        return {figure: {name: of[name] for name in shown} for figure, of in PAPER_SETS.items()}
+    return {
+        f"error-m_b-{value_name(value)}": parameters_for(value, shown, method, metric)
+        for value in m_b
+    }

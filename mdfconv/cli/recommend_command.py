@@ -2,27 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from mdfconv.cli.options import (
-    ExposureOption,
-    FixedGammaOption,
-    Format,
-    FormatOption,
-    FromOption,
-    MetricOption,
-    asked_endpoint,
-    chosen_metric,
-    fixed_gamma,
-)
+from mdfconv.cli import options
+from mdfconv.cli.options import argument, option
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import console, form_of, print_table, table_text, value_text
 from mdfconv.output.records import json_text
-
-if TYPE_CHECKING:
-    from mdfconv.recommend import Recommendation
 
 _FOOTNOTE = (
     "[dim]Errors: root mean square and maximum under the metric, relative to the source's. "
@@ -36,19 +24,16 @@ _HEADINGS = {
 
 
 def command(
-    value: Annotated[float, typer.Argument(metavar="VALUE", help="Parameter of the surface.")],
-    source: FromOption,
+    value: Annotated[float, argument("VALUE", "Parameter of the surface.")],
+    source: options.FromOption,
     tolerance: Annotated[
         float,
-        typer.Option(
-            metavar="T",
-            help="Largest maximum error allowed under the metric, relative to the source's.",
-        ),
+        option("T", "Largest maximum error allowed under the metric, relative to the source's."),
     ] = 0.05,
-    metric: MetricOption = "environment",
-    exposure: ExposureOption = None,
-    gamma: FixedGammaOption = None,
-    format_: FormatOption = None,
+    metric: options.MetricOption = "environment",
+    exposure: options.ExposureOption = None,
+    gamma: options.FixedGammaOption = None,
+    format_: options.FormatOption = None,
 ) -> None:
     """Recommend the cheapest distribution and conversion for a surface.
 
@@ -69,40 +54,31 @@ def command(
     from mdfconv.distributions.endpoint import with_gamma
     from mdfconv.recommend import recommend
 
-    end = with_gamma(asked_endpoint(source), fixed_gamma(gamma))
-    kept = chosen_metric(metric, exposure)
+    end = with_gamma(options.asked_endpoint(source), options.fixed_gamma(gamma))
+    kept = options.chosen_metric(metric, exposure)
     recommendation = recommend(
         end.distribution, end.decode_one(value), one_parameter_distributions(), kept, tolerance
     )
-    asked = {"from": end.label, "value": value, "metric": str(kept), "tolerance": tolerance}
-    _write(recommendation, asked, form_of(format_, in_pipe=Format.plain))
-
-
-def _write(recommendation: Recommendation, asked: dict[str, Any], form: Format) -> None:
     rows, reason = recommendation.records(), recommendation.reason
     columns, answers = list(rows[0]), recommendation.chosen
     sentence = reason[0].upper() + reason[1:]
-    if form is Format.json:
+    form = form_of(format_, in_pipe="plain")
+    if form == "json":
+        asked = {"from": end.label, "value": value, "metric": str(kept), "tolerance": tolerance}
         chosen = {use: vars(candidate) for use, candidate in answers.items()}
         typer.echo(json_text(asked | chosen | {"reason": reason, "candidates": rows}))
-    elif form is Format.markdown:
+    elif form == "markdown":
         typer.echo(f"{table_text(columns, rows, form)}\n\n{sentence}")
-    elif form is Format.table:
-        out = console()
-        _print_table(rows, asked)
-        out.print(sentence)
-        out.print(_FOOTNOTE)
+    elif form == "table":
+        shown = [{heading: row[key] for key, heading in _HEADINGS.items()} for row in rows]
+        styles = ["bold" if row["chosen"] else "" if row["within"] else "dim" for row in rows]
+        title = f"{end.label} {value:g} within {tolerance:g}, {kept}"
+        print_table(list(shown[0]), shown, title, styles, secondary=("RMSE", "within"))
+        console().print(f"{sentence}\n{_FOOTNOTE}")
     else:
         lines = [
             f"{use} {answer.distribution} {value_text(answer.parameter)} {answer.method}"
             for use, answer in answers.items()
         ]
-        typer.echo("\n".join(lines) if form is Format.plain else table_text(columns, rows, form))
+        typer.echo("\n".join(lines) if form == "plain" else table_text(columns, rows, form))
         tell(reason)
-
-
-def _print_table(rows: list[dict[str, Any]], asked: dict[str, Any]) -> None:
-    title = f"{asked['from']} {asked['value']:g} within {asked['tolerance']:g}, {asked['metric']}"
-    shown = [{heading: row[key] for key, heading in _HEADINGS.items()} for row in rows]
-    styles = ["bold" if row["chosen"] else "" if row["within"] else "dim" for row in rows]
-    print_table(list(shown[0]), shown, title, styles, secondary=("RMSE", "within"))

@@ -10,9 +10,7 @@ from mdfconv.cli.tables import progress
 
 
 def command(
-    context: typer.Context,
-    output: FolderOption = None,
-    force: ForceOption = False,
+    context: typer.Context, output: FolderOption = None, force: ForceOption = False
 ) -> None:
     """Write every table and figure, and an index (README.md) that says what each one is.
 

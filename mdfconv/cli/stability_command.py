@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from mdfconv.cli import completion
-from mdfconv.cli.options import ForceOption, FormatOption, OutputOption
+from mdfconv.cli.options import ForceOption, FormatOption, OutputOption, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 
 # Of a table in a narrow terminal.
 _SECONDARY = ("textbook", "worst", "error_in_eps", "cases", "out_of_range")
-
-
-class Part(StrEnum):
-    """The parts of the audit."""
-
-    kernels = "kernels"
-    conversions = "conversions"
 
 
 def command(
@@ -29,13 +21,11 @@ def command(
     force: ForceOption = False,
     mdf: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="MDF",
-            autocompletion=completion.distributions,
-            help="Only this distribution; repeatable.",
-        ),
+        option("MDF", "Only this distribution; repeatable.", words=completion.distributions),
     ] = None,
-    part: Annotated[Part | None, typer.Option(help="Only this part.")] = None,
+    part: Annotated[
+        Literal["kernels", "conversions"] | None, typer.Option(help="Only this part.")
+    ] = None,
 ) -> None:
     """Audit the hard cases: errors against 50-digit values, beside those of the printed formulas.
 

@@ -32,7 +32,7 @@ _LONGEST_WORD = 24
 # Columns of text are hard to read in less.
 _READABLE_WIDTH = 16
 _LETTER = re.compile(r"[^\W\d_eE]")
-_ENDINGS = {".json": Format.json, ".md": Format.markdown, ".txt": Format.table}
+_ENDINGS: dict[str, Format] = {".json": "json", ".md": "markdown", ".txt": "table"}
 
 
 def value_text(value: float | tuple[float, ...]) -> str:
@@ -40,15 +40,13 @@ def value_text(value: float | tuple[float, ...]) -> str:
     return ",".join(map(number_text, value if isinstance(value, tuple) else (value,)))
 
 
-def form_of(
-    asked: Format | None, output: Path | None = None, *, in_pipe: Format = Format.csv
-) -> Format:
+def form_of(asked: Format | None, output: Path | None = None, *, in_pipe: Format = "csv") -> Format:
     """Return the form that was asked for, or that of a file's name, a terminal or a pipe."""
     if asked is not None:
         return asked
     if output is not None:
-        return _ENDINGS.get(output.suffix.lower(), Format.csv)
-    return Format.table if sys.stdout.isatty() else in_pipe
+        return _ENDINGS.get(output.suffix.lower(), "csv")
+    return "table" if sys.stdout.isatty() else in_pipe
 
 
 def write_table(
@@ -59,13 +57,12 @@ def write_table(
     *,
     beside: Mapping[Path, bytes] | None = None,
     title: str = "",
-    styles: Sequence[str] = (),
     secondary: Sequence[str] = (),
 ) -> None:
     """Write rows to standard output or to the file of the table, in the form asked for.
 
     `beside` has other files of the command, written with that of the table or before it is printed;
-    title, `styles` of rows and `secondary` are those of `print_table`.
+    title and `secondary` are those of `print_table`.
     """
     output = outputs.table if outputs else None
     form = form_of(form, output)
@@ -77,27 +74,27 @@ def write_table(
         outputs.write({**(beside or {}), **table})
     if output:
         return
-    if form is Format.table:
-        print_table(columns, rows, title, styles, secondary=secondary)
+    if form == "table":
+        print_table(columns, rows, title, secondary=secondary)
     else:
         typer.echo(table_text(columns, rows, form))
 
 
 def table_text(columns: Sequence[str], rows: Sequence[Record], form: Format) -> str:
     """Return rows as text in a form."""
-    if form is Format.json:
+    if form == "json":
         return json_text([{column: row[column] for column in columns} for row in rows])
-    if form is Format.table:
+    if form == "table":
         buffer = io.StringIO()
-        _print(_console(buffer), _columns(columns, rows))
+        _print(console(buffer), _columns(columns, rows))
         return buffer.getvalue().rstrip()
-    number = cell_text if form is Format.markdown else str
+    number = cell_text if form == "markdown" else str
     flat = [{column: _flat(row[column], number) for column in columns} for row in rows]
-    if form is Format.csv:
+    if form == "csv":
         return csv_text(columns, flat)
-    if form is Format.markdown:
+    if form == "markdown":
         return markdown_text(columns, flat)
-    return "\n".join(" ".join(_plain_cell(row[column]) for column in columns) for row in flat)
+    return "\n".join(" ".join(map(_plain_cell, row.values())) for row in flat)
 
 
 def print_table(
@@ -117,7 +114,7 @@ def print_table(
     are left out first, from the last one, then the last of the others; standard error says which,
     and what option shows `everything`.
     """
-    out = console(err=err)
+    out = console(sys.stderr if err else sys.stdout)
     shown = rows[:ROWS_SHOWN]
     table = _columns(columns, shown)
     printed = _with_room(table, out.width, secondary) if out.is_terminal else table
@@ -153,10 +150,6 @@ class _Column:
         ]
         readable = min(self.widest, _READABLE_WIDTH) if self.words else 0
         return max(readable, *map(_width, self.name.split()), *unbroken)
-
-    def width(self, limit: int) -> int:
-        """Return the width of a column that is to have at most so much."""
-        return max(self.narrowest, min(self.widest, limit))
 
 
 def _width(text: str) -> int:
@@ -195,7 +188,7 @@ def _widths(table: list[_Column], room: int) -> list[int]:
     """Return what each column gets: all it can use, or of the same for all as much as fits."""
     widths = [column.narrowest for column in table]
     for limit in range(max((column.widest for column in table), default=0) + 1):
-        wider = [column.width(limit) for column in table]
+        wider = [max(column.narrowest, min(column.widest, limit)) for column in table]
         if _framed(wider) > room:
             break
         widths = wider
@@ -221,19 +214,16 @@ def _print(out: Console, table: list[_Column], title: str = "", styles: Sequence
     for number, cells in enumerate(zip(*(column.cells for column in table), strict=True)):
         rich.add_row(*map(escape, cells), style=styles[number] if styles else None)
     # Where no column can be left out a pipe is as wide as it takes.
-    _console(out.file, max(out.width, _framed(widths))).print(rich)
+    console(out.file, max(out.width, _framed(widths))).print(rich)
 
 
-def console(*, err: bool = False) -> Console:
-    """Return a Rich console on standard output or error, wide enough for a table in a pipe."""
-    return _console(sys.stderr if err else sys.stdout)
-
-
-def _console(stream: IO[str], width: int | None = None) -> Console:
+def console(stream: IO[str] | None = None, width: int | None = None) -> Console:
+    """Return a Rich console, usually on standard output, wide enough for a table in a pipe."""
     from rich.console import Console
 
-    usual = None if stream.isatty() else _PIPE_WIDTH
-    return Console(file=stream, width=width or usual, highlight=False)
+    file = stream or sys.stdout
+    usual = None if file.isatty() else _PIPE_WIDTH
+    return Console(file=file, width=width or usual, highlight=False)
 
 
 @contextmanager

@@ -2,98 +2,63 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import (
-    ExposureOption,
-    FixedGammaOption,
-    ForceOption,
-    MethodOption,
-    MetricOption,
-    PngOption,
-    SpecularOption,
-    chosen_metric,
-    fixed_gamma,
-    refuse_given,
-    refuse_idle_metric,
-)
+from mdfconv.cli import completion, options
+from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import progress
 
 
-class Depth(StrEnum):
-    """Bits of the result."""
-
-    keep = "keep"
-    eight = "8"
-    sixteen = "16"
-
-
 def command(
     context: typer.Context,
-    source_file: Annotated[
-        Path, typer.Argument(metavar="IN", help="Texture: PNG, TIFF, TGA or OpenEXR.")
-    ],
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="OUT", help="File to write; not IN.")
-    ],
+    source_file: Annotated[Path, argument("IN", "Texture: PNG, TIFF, TGA or OpenEXR.")],
+    output: Annotated[Path, option("OUT", "File to write; not IN.", "--output", "-o")],
     source: Annotated[
         str,
-        typer.Option(
-            "--from",
-            metavar="MDF:ENCODING",
-            autocompletion=completion.texels,
-            help="What the texels are: ggx:alpha, ggx:roughness, ggx:glossiness, likewise "
+        option(
+            "MDF:ENCODING",
+            "What the texels are: ggx:alpha, ggx:roughness, ggx:glossiness, likewise "
             "beckmann; blinn-phong:exponent (N / --exponent-max), blinn-phong:log2 (N = 2^(k v)).",
+            "--from",
+            words=completion.texels,
         ),
     ],
     target: Annotated[
         str,
-        typer.Option(
-            "--to",
-            metavar="MDF:ENCODING",
-            autocompletion=completion.texels,
-            help="What they become, as for --from.",
-        ),
+        option("MDF:ENCODING", "What they become, as for --from.", "--to", words=completion.texels),
     ],
     channel: Annotated[
         str | None,
-        typer.Option(
-            metavar="C",
-            help="r, g, b, a or l (grey), in OpenEXR its name; several as rgb or r,g. Needed if "
+        option(
+            "C",
+            "r, g, b, a or l (grey), in OpenEXR its name; several as rgb or r,g. Needed if "
             "there are several.",
         ),
     ] = None,
-    method: MethodOption = None,
-    metric: MetricOption = "environment",
-    exposure: ExposureOption = None,
-    gamma: FixedGammaOption = None,
-    specular: SpecularOption = None,
+    method: options.MethodOption = None,
+    metric: options.MetricOption = "environment",
+    exposure: options.ExposureOption = None,
+    gamma: options.FixedGammaOption = None,
+    specular: options.SpecularOption = None,
     exponent_max: Annotated[
-        float, typer.Option(metavar="N", help="Exponent of the brightest texel, for exponent.")
+        float, option("N", "Exponent of the brightest texel, for exponent.")
     ] = 1000.0,
-    log2_scale: Annotated[
-        float, typer.Option(metavar="K", help="k of log2; 13 is for exponents up to 8192.")
-    ] = 13.0,
-    depth: Annotated[Depth, typer.Option(help="Bits of the result.")] = Depth.keep,
-    dither: Annotated[
-        bool, typer.Option("--dither", help="Diffuse the errors of rounding to 8 bits.")
-    ] = False,
+    log2_scale: Annotated[float, option("K", "k of log2; 13 is for exponents up to 8192.")] = 13.0,
+    depth: Annotated[Literal["keep", "8", "16"], typer.Option(help="Bits of the result.")] = "keep",
+    dither: Annotated[bool, flag("--dither", "Diffuse the errors of rounding to 8 bits.")] = False,
     lossy: Annotated[
-        bool, typer.Option("--lossy", help="Take a JPEG, although it has altered the values.")
+        bool, flag("--lossy", "Take a JPEG, although it has altered the values.")
     ] = False,
     max_pixels: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, help="Largest picture to decode; default 134217728."),
+        int | None, option("N", "Largest picture to decode; default 134217728.", min=1)
     ] = None,
-    png: PngOption = None,
-    force: ForceOption = False,
+    png: options.PngOption = None,
+    force: options.ForceOption = False,
 ) -> None:
     """Convert a roughness texture, texel by texel.
 
@@ -117,24 +82,18 @@ def command(
     from mdfconv.scene.texture.rule import TextureRule
 
     _check_given(context, source, target)
-    refuse_idle_metric(context, method)
-    chosen = chosen_metric(metric, exposure)
+    options.refuse_idle_metric(context, method)
+    chosen = options.chosen_metric(metric, exposure)
     outputs = Outputs(output, png, force=force, inputs=[source_file, *chosen.inputs])
-    rule = TextureRule(
-        *with_specular(source, target, specular),
-        method,
-        str(chosen),
-        exponent_max,
-        log2_scale,
-        fixed_gamma(gamma),
-    )
+    ends, fixed = with_specular(source, target, specular), options.fixed_gamma(gamma)
+    rule = TextureRule(*ends, method, str(chosen), exponent_max, log2_scale, fixed)
     with outputs.staged() as files:
         report = convert_texture_file(
             source_file,
             output,
             rule,
             channel=channel,
-            depth=None if depth is Depth.keep else int(depth),
+            depth=None if depth == "keep" else int(depth),
             dither=dither,
             lossy=lossy,
             max_pixels=max_pixels,
@@ -156,6 +115,6 @@ def command(
 def _check_given(context: typer.Context, *names: str) -> None:
     """Refuse what says nothing about these names."""
     encodings = [name.partition(":")[2].strip().lower() for name in names]
-    for option, encoding in (("exponent_max", "exponent"), ("log2_scale", "log2")):
+    for name, encoding in (("exponent_max", "exponent"), ("log2_scale", "log2")):
         if encoding not in encodings:
-            refuse_given(context, [option], f"goes with blinn-phong:{encoding}")
+            options.refuse_given(context, [name], f"goes with blinn-phong:{encoding}")

@@ -25,6 +25,7 @@ from mdfconv.distributions.evaluation import Array, Mask, as_operand, in_parts, 
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError, MdfconvWarning
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
+from mdfconv.fitting.problem import ConversionTask
 
 FREE: Literal["free"] = "free"
 Gamma: TypeAlias = float | Literal["free"] | None
@@ -281,7 +282,11 @@ class ConversionRule:
             if self.exact is not None:
                 return Solution(np.asarray(follow(self.exact, parameter)))
             check_covered(self.method, self.metric, *self.ends)
-            return self.method.solve(parameter, *self.pair, self.metric)
+            return self.method.solve(self.task(parameter))
+
+    def task(self, parameter: Array) -> ConversionTask:
+        """Return what is to be done with parameters of the source."""
+        return ConversionTask(self.pair[0], parameter, self.pair[1], self.metric)
 
     def cautions(self, converted: Converted) -> dict[str, Mask]:
         """Return sentences, and of which of the numbers they are true."""
@@ -291,7 +296,8 @@ class ConversionRule:
         cautions |= {f"{self.target.label} clamps: {text}": clamped[text] for text in clamped}
         if self._same_lobes is None:
             with np.errstate(all="ignore"):
-                cautions |= self.method.cautions(converted.parameter, converted.result, *self.pair)
+                task = self.task(converted.parameter)
+                cautions |= self.method.cautions(task, converted.result)
         if converted.gamma_at_limit is not None:
             low, high = self.pair[1].parameters[1].fit_range
             sentence = (
@@ -337,7 +343,7 @@ class ConversionRule:
             if method.name == self.method.name or not method.covers(*self.pair, self.metric):
                 continue
             with np.errstate(all="ignore"):
-                result = method.convert(np.asarray([parameter]), *self.pair, self.metric)
+                result = method.convert(self.task(np.asarray([parameter])))
             stored = self.target.encode(result)
             if self.target.stored.accepts(stored)[0]:
                 verb = "" if answers else " answers"

@@ -175,11 +175,6 @@ def tangent_square(beta: Array, out: Array | None = None) -> Array:
     return np.square(tangent, out=tangent)
 
 
-def negative_log_tail(lobe: Array, tail: Array) -> Array:
-    """Return −ln(1 − F) for F and 1 − F, from the one that has the digits."""
-    return np.where(lobe < tail, -np.log1p(-lobe), -np.log(tail))
-
-
 @cache
 def gauss_legendre(order: int) -> tuple[Array, Array]:
     """Return nodes and weights on [−1, 1]; they must not be written to."""

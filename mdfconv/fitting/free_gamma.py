@@ -11,7 +11,7 @@ from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Indices, Mask
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.problem import FitProblem, FitTask, bounded_tangent
+from mdfconv.fitting.problem import ConversionTask, FitProblem, bounded_tangent
 from mdfconv.fitting.quadrature import Quadrature, SmoothQuadrature
 from mdfconv.fitting.solve import candidates, descend
 
@@ -147,7 +147,7 @@ def fit_free_gamma(
     shape = target.second_parameter
     if shape is None:
         raise MdfconvError(f"{target.name} has one parameter and no γ")
-    task = FitTask(source, parameter, target, metric, quadrature)
+    task = ConversionTask(source, parameter, target, metric, quadrature)
     rows = np.arange(parameter.size)
     # Where nothing fits the result is NaN, which says so.
     with np.errstate(all="ignore"):
@@ -160,7 +160,7 @@ def fit_free_gamma(
     return FreeFit(best, gamma, distance, np.isin(gamma, shape.fit_range))
 
 
-def _fit_batch(task: FitTask, rows: Indices) -> Array:
+def _fit_batch(task: ConversionTask, rows: Indices) -> Array:
     """Return the first parameters, γ and distances of some of the fits, shape (3, rows)."""
     if task.quadrature is None and task.metric.over_angles:
         # The best lobes are about as wide as the source's.
@@ -184,7 +184,7 @@ def _fit_batch(task: FitTask, rows: Indices) -> Array:
     return np.stack([best, gamma, distance])
 
 
-def _start(task: FitTask, rows: Indices) -> Array:
+def _start(task: ConversionTask, rows: Indices) -> Array:
     """Return ln p and ln γ of the lowest of many candidates, shape (n, 2), inside the bounds."""
     every_row = np.arange(rows.size)
     lowest, start = np.full(rows.size, np.inf), np.zeros((rows.size, 2))

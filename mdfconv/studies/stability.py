@@ -25,6 +25,7 @@ from mdfconv.distributions.endpoint import Endpoint, exact_route
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvWarning
 from mdfconv.fitting.metrics import metric_named
+from mdfconv.fitting.problem import ConversionTask
 
 # Of the kernels. Conversions compute in float64 throughout: float32 rounds input and result.
 _KERNEL_TYPES = (np.float64, np.float32, np.float16)
@@ -358,7 +359,7 @@ def printed_conversion(
     with np.errstate(all="ignore"):
         if isinstance(method, FormulaMethod):
             # It holds the formulas as printed.
-            result = method.convert(values, source, target, metric_named("unit"))
+            result = method.convert(ConversionTask(source, values, target, metric_named("unit")))
         else:
             first, last = (
                 getattr(end.printed, name)

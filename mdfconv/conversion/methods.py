@@ -152,9 +152,10 @@ _SWEEP = {
 }
 
 
-def _turning_point(linear: float, cubic: float) -> float:
-    """Return where linear x − cubic x³ has its maximum."""
-    return float(np.sqrt(linear / (3 * cubic)))
+def _cubic(text: str, linear: float, cubic: float) -> ParameterMap:
+    """Return linear x − cubic x³, which turns around where it has a maximum."""
+    turns_at = float(np.sqrt(linear / (3 * cubic))) if cubic > 0 else float("inf")
+    return ParameterMap(text, lambda x: x * (linear - cubic * x * x), turns_at)
 
 
 _FORMULAS = {
@@ -164,14 +165,8 @@ _FORMULAS = {
     ("blinn-phong", "beckmann"): ParameterMap(
         "m_B = √2/√(N+2.5) (eq. 12)", lambda n: np.sqrt(2) / np.sqrt(n + 2.5)
     ),
-    ("beckmann", "gauss"): ParameterMap(
-        "m_G = 0.5591 m_B³ + m_B (eq. 13)", lambda m: m * (1 + 0.5591 * m * m)
-    ),
-    ("gauss", "beckmann"): ParameterMap(
-        "m_B = m_G − 0.4134 m_G³ (eq. 13)",
-        lambda m: m * (1 - 0.4134 * m * m),
-        _turning_point(1, 0.4134),
-    ),
+    ("beckmann", "gauss"): _cubic("m_G = 0.5591 m_B³ + m_B (eq. 13)", 1, -0.5591),
+    ("gauss", "beckmann"): _cubic("m_B = m_G − 0.4134 m_G³ (eq. 13)", 1, 0.4134),
     ("gauss", "blinn-phong"): ParameterMap("N = 2/m_G² − 0.5 (eq. 14)", lambda m: 2 / m**2 - 0.5),
     ("blinn-phong", "gauss"): ParameterMap(
         "m_G = √2/√(N+0.5) (eq. 14)", lambda n: np.sqrt(2) / np.sqrt(n + 0.5)
@@ -182,25 +177,15 @@ _FORMULAS = {
     ("sawicki", "blinn-phong"): ParameterMap(
         "N = (N_DS − 0.3)/1.174 (eq. 15)", lambda n: (n - 0.3) / 1.174
     ),
-    ("ggx", "gauss"): ParameterMap(
-        "m_G = 0.8222 C + 0.82 C³ (Table 3)", lambda c: c * (0.8222 + 0.82 * c * c)
-    ),
+    ("ggx", "gauss"): _cubic("m_G = 0.8222 C + 0.82 C³ (Table 3)", 0.8222, -0.82),
     ("ggx", "beckmann"): ParameterMap(
         "m_B = 0.8388 C + 0.7 C⁴ (Table 3)", lambda c: c * (0.8388 + 0.7 * c**3)
     ),
     ("ggx", "blinn-phong"): ParameterMap(
         "N = 1.696²/C² − 4.5 (Table 3)", lambda c: 1.696**2 / c**2 - 4.5
     ),
-    ("gauss", "ggx"): ParameterMap(
-        "C = 1.186 m_G − 0.835 m_G³ (Table 4)",
-        lambda m: m * (1.186 - 0.835 * m * m),
-        _turning_point(1.186, 0.835),
-    ),
-    ("beckmann", "ggx"): ParameterMap(
-        "C = 1.2 m_B − 0.56 m_B³ (Table 4)",
-        lambda m: m * (1.2 - 0.56 * m * m),
-        _turning_point(1.2, 0.56),
-    ),
+    ("gauss", "ggx"): _cubic("C = 1.186 m_G − 0.835 m_G³ (Table 4)", 1.186, 0.835),
+    ("beckmann", "ggx"): _cubic("C = 1.2 m_B − 0.56 m_B³ (Table 4)", 1.2, 0.56),
     ("blinn-phong", "ggx"): ParameterMap(
         "C = 1.697/√(N+4.5) (Table 4)", lambda n: 1.697 / np.sqrt(n + 4.5)
     ),

@@ -11,14 +11,7 @@ from typing import Any, Literal, TypeAlias, TypedDict, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mdfconv.conversion.methods import (
-    Solution,
-    check_covered,
-    default_method,
-    list_methods,
-    method_named,
-    method_with_free_gamma,
-)
+from mdfconv.conversion import methods
 from mdfconv.distributions import list_distributions
 from mdfconv.distributions.endpoint import Endpoint, endpoints, exact_route, follow
 from mdfconv.distributions.evaluation import Array, Mask, as_operand, in_parts, worth_threads
@@ -160,7 +153,8 @@ def holds_pairs(values: Any) -> bool:
     if not isinstance(values, list):
         return False
     kinds = set(map(type, values))
-    return any(map(_is_pair, kinds)) or (list in kinds and any(map(holds_pairs, values)))
+    pairs = any(issubclass(kind, tuple) for kind in kinds)
+    return pairs or (list in kinds and any(map(holds_pairs, values)))
 
 
 def in_order(values: list[Any], convert_part: Callable[[Any], list[Any]]) -> list[Any]:
@@ -174,10 +168,6 @@ def in_order(values: list[Any], convert_part: Callable[[Any], list[Any]]) -> lis
     results = iter(convert_part(tuple(map(list, zip(*pairs, strict=True)))))
     others = iter(convert_part(numbers) if numbers else ())
     return [next(results if isinstance(value, tuple) else others) for value in values]
-
-
-def _is_pair(kind: type) -> bool:
-    return issubclass(kind, tuple)
 
 
 def listed(result: Any) -> list[Any]:
@@ -218,11 +208,11 @@ class ConversionRule:
         self.pair = self.source.distribution, self.target.distribution
         self.metric = metric_or_default(metric)
         if self.free:
-            self.method = method_with_free_gamma(method, self.pair[1])
+            self.method = methods.method_with_free_gamma(method, self.pair[1])
         elif method is not None:
-            self.method = method_named(method)
+            self.method = methods.method_named(method)
         else:
-            self.method = default_method(*self.pair, metric_given=metric is not None)
+            self.method = methods.default_method(*self.pair, metric_given=metric is not None)
         self._same_lobes = exact_route(*self.pair)
         self.exact = None if self.free else self._same_lobes
 
@@ -276,12 +266,12 @@ class ConversionRule:
             raise self.refusal(float(parameter.flat[index]), float(result), which)
         return Converted(parameter, stored, *solution)
 
-    def solve(self, parameter: Array) -> Solution:
+    def solve(self, parameter: Array) -> methods.Solution:
         """Return what the target has for parameters, whether it is legal or not."""
         with np.errstate(all="ignore"):
             if self.exact is not None:
-                return Solution(np.asarray(follow(self.exact, parameter)))
-            check_covered(self.method, self.metric, *self.ends)
+                return methods.Solution(np.asarray(follow(self.exact, parameter)))
+            methods.check_covered(self.method, self.metric, *self.ends)
             return self.method.solve(self.task(parameter))
 
     def task(self, parameter: Array) -> ConversionTask:
@@ -339,7 +329,7 @@ class ConversionRule:
     def _other_answers(self, parameter: float) -> str:
         """Return what the other methods make of a parameter, in words."""
         answers: list[str] = []
-        for method in list_methods():
+        for method in methods.list_methods():
             if method.name == self.method.name or not method.covers(*self.pair, self.metric):
                 continue
             with np.errstate(all="ignore"):

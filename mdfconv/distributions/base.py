@@ -113,6 +113,14 @@ class Options(TypedDict, total=False):
     threads: int
 
 
+class CumulativeOptions(TypedDict, total=False):
+    """The options of `Distribution.cumulative`."""
+
+    gamma: ArrayLike | None
+    complement: bool
+    threads: int
+
+
 _SMALLEST_ANGLE = 1e-30
 # The square of an angle is about the share of the lobe within it: the least one above 0.
 _SMALLEST_DRAWN = 1e-160
@@ -314,13 +322,7 @@ class Distribution(ABC):
     def cumulative(self, beta: float, parameter: float, *, complement: bool = ...) -> float: ...
     @overload
     def cumulative(
-        self,
-        beta: ArrayLike,
-        parameter: ArrayLike,
-        *,
-        gamma: ArrayLike | None = ...,
-        complement: bool = ...,
-        threads: int = ...,
+        self, beta: ArrayLike, parameter: ArrayLike, **options: Unpack[CumulativeOptions]
     ) -> Array: ...
 
     def cumulative(
@@ -616,9 +618,19 @@ class Distribution(ABC):
         self, kernel: str, beta: ArrayLike, pair: Any, phi: ArrayLike | None, threads: int
     ) -> Any:
         """Evaluate the kernel of a name for a pair of parameters and azimuths."""
-        raise MdfconvError(
-            f"{self.name} is isotropic here: it takes one parameter and no azimuth phi"
-        )
+        if self.anisotropic and not isinstance(pair, tuple):
+            raise MdfconvError("an azimuth phi needs a pair of parameters")
+        for_pair = getattr(self, f"{kernel}_pair", None)
+        if for_pair is None:
+            raise MdfconvError(
+                f"{self.name} is isotropic here: it takes one parameter and no azimuth phi"
+            )
+        if len(pair) != 2:
+            raise MdfconvError(f"a pair of parameters has two members, not {len(pair)}")
+        if phi is None:
+            raise MdfconvError("a pair of parameters needs an azimuth phi")
+        x, y = (self._held(value, beta, phi) for value in pair)
+        return evaluate(for_pair, beta, x, y, phi, threads=threads)
 
     def _held(self, parameter: ArrayLike, *others: Any) -> Any:
         """Return legal parameters that the type in which all is computed can hold."""
@@ -654,20 +666,6 @@ class AnisotropicDistribution(Distribution):
     def _normalized_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
         self._lobe_pair(beta, x, y, phi, out)
         out *= self._finite(self._at_normal_pair(x, y))
-
-    def _evaluate_pair(
-        self, kernel: str, beta: ArrayLike, pair: Any, phi: ArrayLike | None, threads: int
-    ) -> Any:
-        if not isinstance(pair, tuple):
-            raise MdfconvError("an azimuth phi needs a pair of parameters")
-        if not hasattr(self, f"{kernel}_pair"):
-            return super()._evaluate_pair(kernel, beta, pair, phi, threads)
-        if len(pair) != 2:
-            raise MdfconvError(f"a pair of parameters has two members, not {len(pair)}")
-        if phi is None:
-            raise MdfconvError("a pair of parameters needs an azimuth phi")
-        x, y = (self._held(value, beta, phi) for value in pair)
-        return evaluate(getattr(self, f"{kernel}_pair"), beta, x, y, phi, threads=threads)
 
 
 class AlphaDistribution(Distribution):

@@ -60,7 +60,9 @@ class Endpoint:
 
     def decode(self, values: ArrayLike) -> Array:
         """Return the parameters (float64) for stored values; raise if one is illegal."""
-        self._check_clamps(values)
+        for text, which in self.clamped(np.asarray(values)).items():
+            if np.any(which):
+                raise MdfconvError(f"{self.label} has no inverse here: {text}")
         stored = np.asarray(self.stored.check(values, self.label), dtype=np.float64)
         with np.errstate(all="ignore"):
             parameter = self.encoding.decode(stored) if self.encoding else stored
@@ -131,12 +133,6 @@ class Endpoint:
                 f"{self.pairing.second.legal}, and x is the rougher axis"
             )
         return _plain(first), _plain(second)
-
-    def _check_clamps(self, values: ArrayLike) -> None:
-        stored = np.asarray(values)
-        for text, which in self.clamped(stored).items():
-            if np.any(which):
-                raise MdfconvError(f"{self.label} has no inverse here: {text}")
 
 
 def _plain(numbers: Array) -> Any:

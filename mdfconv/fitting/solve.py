@@ -384,7 +384,7 @@ def _follow(task: ConversionTask, steps: Sequence[Metric], start: Array) -> Atte
         return Attempt.nothing(start.size)
     accepts = task.target.parameter.accepts
     best, distance, before = np.full((3, task.parameter.size), np.nan)
-    for rows in _batches(np.flatnonzero(accepts(start)), _WARM_ROWS):
+    for rows in batches(np.flatnonzero(accepts(start)), _WARM_ROWS):
         part, near = task.part(rows), start[rows]
         with np.errstate(all="ignore"):
             for metric in steps[:-1]:
@@ -447,7 +447,7 @@ def _search(task: ConversionTask) -> Attempt:
         similar = scale < 1
         widened = source.from_half_tangent(metric.similar_below)
         task = task._replace(parameter=np.where(similar, widened, parameter))
-    for rows in _batches(np.arange(parameter.size), _ROWS_AT_ONCE):
+    for rows in batches(np.arange(parameter.size), _ROWS_AT_ONCE):
         best[rows], distance[rows] = _global_minimum(task.problem(rows))
     if metric.similar_below and similar.any():
         tangent = target.half_tangent(best[similar]) * scale[similar]
@@ -487,7 +487,8 @@ class _CoarseSamples:
         return self.coarse(rows, fine=True)
 
 
-def _batches(rows: Indices, size: int) -> Iterator[Indices]:
+def batches(rows: Indices, size: int) -> Iterator[Indices]:
+    """Yield rows in parts of a size."""
     return (rows[start : start + size] for start in range(0, rows.size, size))
 
 

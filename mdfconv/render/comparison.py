@@ -277,7 +277,8 @@ def compare(
 def _closeup_frame(extent: float, size: int) -> Frame:
     """Return what shows a highlight alone, or the sphere where that is no larger."""
     enlarged = int(MARGIN / np.sin(min(extent, 0.5 * np.pi)))
-    return Frame(size, sphere.highlight(), MARGIN / enlarged) if enlarged > 1 else Frame(size)
+    x, y, _ = sphere.HIGHLIGHT.tolist()
+    return Frame(size, (x, y), MARGIN / enlarged) if enlarged > 1 else Frame(size)
 
 
 def _rendered(

@@ -386,21 +386,18 @@ def _curves() -> list[dict[str, Any]]:
     which the levels from 1 to 255 start.
     """
     root = np.linspace(0, 1, _CURVE_ENTRIES)
+    filmic = _filmic(_FILMIC_WHITE * np.square(root))
+    curves = ("sRGB", 1.0, np.square(root)), ("filmic", _FILMIC_WHITE, filmic)
+    levels = np.arange(1, 256)
     return [
-        _curve("sRGB", 1.0, srgb(np.square(root))),
-        _curve("filmic", _FILMIC_WHITE, srgb(_filmic(_FILMIC_WHITE * np.square(root)))),
+        {
+            "label": label,
+            "white": white,
+            "entries": _CURVE_ENTRIES,
+            "starts": _packed(np.searchsorted(np.rint(255 * srgb(shown)), levels), np.uint16),
+        }
+        for label, white, shown in curves
     ]
-
-
-def _curve(label: str, white: float, encoded: Array) -> dict[str, Any]:
-    levels = np.rint(255 * encoded)
-    starts = np.searchsorted(levels, np.arange(1, 256))
-    return {
-        "label": label,
-        "white": white,
-        "entries": _CURVE_ENTRIES,
-        "starts": _packed(starts, np.uint16),
-    }
 
 
 def _filmic(light: Array) -> Array:

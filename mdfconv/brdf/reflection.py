@@ -256,5 +256,8 @@ def _half_length(h: Array) -> Array:
 
 
 BRDFS: Registry[Callable[[Microsurface, Fresnel], Brdf]] = Registry("BRDF")
-for _brdf in (ashikhmin_shirley, cook_torrance, smoothie, smoothie_approx, modified_phong):
-    BRDFS.add(_brdf.__name__.replace("_", "-"), _brdf)
+BRDFS.add("ashikhmin-shirley", ashikhmin_shirley)
+BRDFS.add("cook-torrance", cook_torrance)
+BRDFS.add("smoothie", smoothie)
+BRDFS.add("smoothie-approx", smoothie_approx)
+BRDFS.add("modified-phong", modified_phong)

@@ -27,7 +27,6 @@ Pair: TypeAlias = tuple[float, float]
 Value: TypeAlias = float | Pair
 
 _Word: TypeAlias = str | None
-_PairOfArrays: TypeAlias = tuple[ArrayLike, ArrayLike]
 # Fewer numbers are all looked at sooner than their extremes are found.
 _FEW = 16
 
@@ -59,7 +58,7 @@ def convert(  # type: ignore[overload-overlap]  # a pair of numbers is an array_
 ) -> Pair: ...
 @overload
 def convert(
-    values: _PairOfArrays,
+    values: tuple[ArrayLike, ArrayLike],
     source: Name,
     target: Name,
     method: _Word = ...,

@@ -16,6 +16,7 @@ from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
+from mdfconv.fitting.problem import ConversionTask
 from mdfconv.fitting.solve import fit
 from mdfconv.timing import NOISE, Advance, Spread, interleave, spread
 
@@ -42,7 +43,7 @@ def answers(
 ) -> Array:
     """Return the results of a method that covers the pair, NaN outside the target's range."""
     with np.errstate(all="ignore"):
-        result = np.asarray(method.convert(parameter, source, target, metric))
+        result = np.asarray(method.convert(ConversionTask(source, parameter, target, metric)))
         return np.where(target.parameter.accepts(result), result, np.nan)
 
 

@@ -18,6 +18,7 @@ from mdfconv.distributions.endpoint import exact_route, to_root
 from mdfconv.fitting import maps
 from mdfconv.fitting.maps import MapMaker, Piece
 from mdfconv.fitting.metrics import list_metrics, metric_named
+from mdfconv.fitting.problem import ConversionTask
 from mdfconv.fitting.solve import FitCurve, cold_fit
 
 # A distribution that is another one in another parameter is a target of its own: near a uniform
@@ -60,7 +61,7 @@ class Pair(MapMaker):
             self.end = 1 - 1e-9
         self.grid = self.end * np.linspace(0, 1, GRID)[1:]
         knots = self.source.map_variables.from_width(self.grid)
-        self.curve = FitCurve(self.source, knots, self.target, self.metric)
+        self.curve = FitCurve(ConversionTask(self.source, knots, self.target, self.metric))
 
     def answer(self, parameter):
         """Return the fits' parameters, NaN where there is none that is usable."""

@@ -298,13 +298,9 @@ def no_masking(light: Array, view: Array, m: Array) -> Array:
     return np.where(above(light, view), 1.0, 0)
 
 
-def _of_any_surface(masking: Masking) -> Callable[[Microsurface], Masking]:
-    return lambda surface: masking
-
-
 MASKINGS: Registry[Callable[[Microsurface], Masking]] = Registry("masking")
 MASKINGS.add("correlated", lambda surface: surface.correlated)
 MASKINGS.add("separable", lambda surface: surface.separable)
-MASKINGS.add("v-cavity", _of_any_surface(v_cavity))
-MASKINGS.add("ksk", _of_any_surface(kelemen_szirmay_kalos))
-MASKINGS.add("none", _of_any_surface(no_masking))
+MASKINGS.add("v-cavity", lambda surface: v_cavity)
+MASKINGS.add("ksk", lambda surface: kelemen_szirmay_kalos)
+MASKINGS.add("none", lambda surface: no_masking)

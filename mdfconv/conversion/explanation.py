@@ -21,7 +21,7 @@ from mdfconv.conversion.values import (
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.problem import FitProblem, bounded_tangent, narrowest
+from mdfconv.fitting.problem import ConversionTask, bounded_tangent, narrowest
 
 # 64 × 800 angles and what is computed there stay in the cache.
 _ROWS_AT_ONCE = 64
@@ -48,33 +48,25 @@ def remaining_error(
     blocks: list[Array] = [np.zeros((2, 0))]
     for start in range(0, parameter.size, _ROWS_AT_ONCE):
         rows = slice(start, start + _ROWS_AT_ONCE)
-        lobes = source, parameter[rows], target, result[rows]
+        task = ConversionTask(source, parameter[rows], target, metric)
         with np.errstate(all="ignore"):
-            blocks.append(_errors(*lobes, metric, None if gamma is None else gamma[rows]))
+            blocks.append(_errors(task, result[rows], None if gamma is None else gamma[rows]))
     rmse, maximum = np.concatenate(blocks, axis=1)
     return rmse, maximum
 
 
-def _errors(
-    source: Distribution,
-    parameter: Array,
-    target: Distribution,
-    result: Array,
-    metric: Metric,
-    gamma: Array | None,
-) -> Array:
+def _errors(task: ConversionTask, result: Array, gamma: Array | None) -> Array:
     """Return both errors, shape (2, n), of so few values that the angles stay in the cache."""
     if gamma is None:
-        widths = narrowest(source, parameter, target, result)
+        widths = narrowest(task.source, task.parameter, task.target, result)
     else:
         # A free γ makes the target as wide as the source.
-        target = target.with_gammas(gamma[:, None])
-        widths = np.arctan(bounded_tangent(source, parameter))
+        task = task._replace(target=task.target.with_gammas(gamma[:, None]))
+        widths = np.arctan(bounded_tangent(task.source, task.parameter))
     resolved = widths >= _NARROWEST
     # Where nothing can be said the angles are those of any lobe.
-    angles = metric.quadrature(np.where(resolved, widths, 1.0))
-    rows = np.arange(widths.size)
-    problem = FitProblem(source, parameter, target, metric, angles, rows)
+    angles = task.metric.quadrature(np.where(resolved, widths, 1.0))
+    problem = task._replace(quadrature=angles).problem(np.arange(widths.size))
     errors: Array = np.stack(problem.relative_error(result))
     return np.where(resolved & np.isfinite(errors).all(axis=0), errors, np.nan)
 
@@ -239,7 +231,7 @@ def _methods(parameter: Array, rule: ConversionRule) -> list[str]:
     """Return the name of the method that answered for each parameter."""
     if rule.exact is not None:
         return [rule.method.name] * parameter.size
-    return rule.method.answered_by(parameter, *rule.pair, rule.metric)
+    return rule.method.answered_by(rule.task(parameter))
 
 
 def _route(rule: ConversionRule) -> tuple[str, ...]:

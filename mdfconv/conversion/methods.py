@@ -13,12 +13,13 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.endpoint import Endpoint, ParameterMap, follow, from_root, to_root
+from mdfconv.distributions.endpoint import Endpoint, ParameterMap, follow, to_root
 from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError
-from mdfconv.fitting.maps import StoredFit
+from mdfconv.fitting.maps import StoredFit, made_map
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
+from mdfconv.fitting.problem import ConversionTask
 from mdfconv.registry import Registry
 
 
@@ -59,38 +60,30 @@ class Method(ABC):
         return (self.step,)
 
     @abstractmethod
-    def convert(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> Array:
+    def convert(self, task: ConversionTask) -> Array:
         """Return target parameters (float64), for a pair that is covered.
 
         Where the rule leaves the target's legal range it returns what it computes; where it
         computes nothing, NaN.
         """
 
-    def solve(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> Solution:
+    def solve(self, task: ConversionTask) -> Solution:
         """Return all parameters of the target, as `convert` the first one."""
-        return Solution(np.asarray(self.convert(parameter, source, target, metric)))
+        return Solution(np.asarray(self.convert(task)))
 
     def covers(self, source: Distribution, target: Distribution, metric: Metric) -> bool:
         """Return whether the method can answer for a pair under a metric."""
         return self.route(source, target) is not None
 
-    def answered_by(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> list[str]:
+    def answered_by(self, task: ConversionTask) -> list[str]:
         """Return the name of the method that answers each value, for a pair that is covered."""
-        return [self.name] * parameter.size
+        return [self.name] * task.parameter.size
 
     def range_text(self, source: Distribution, target: Distribution, metric: Metric) -> str:
         """Return which parameters of the source a method with a range of its own covers."""
         return ""
 
-    def cautions(
-        self, parameter: Array, result: Array, source: Distribution, target: Distribution
-    ) -> dict[str, Mask]:
+    def cautions(self, task: ConversionTask, result: Array) -> dict[str, Mask]:
         """Return what a careful user must know in sentences, and of which numbers they are true."""
         return {}
 
@@ -110,32 +103,29 @@ class FormulaMethod(Method):
         steps = self._steps(source, target)
         return None if steps is None else tuple(step.text for step in steps if step.text)
 
-    def convert(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> Array:
+    def convert(self, task: ConversionTask) -> Array:
         """Apply the formulas one after the other; NaN where one leaves the positive numbers."""
-        for number, step in enumerate(self._steps(source, target) or ()):
+        parameter = task.parameter
+        for number, step in enumerate(self._steps(task.source, task.target) or ()):
             if number:
                 parameter = np.where(parameter > 0, parameter, np.nan)
             parameter = step.function(parameter)
         return parameter
 
-    def cautions(
-        self, parameter: Array, result: Array, source: Distribution, target: Distribution
-    ) -> dict[str, Mask]:
+    def cautions(self, task: ConversionTask, result: Array) -> dict[str, Mask]:
         """Say where a formula is used beyond the point at which it turns around."""
-        cautions = {}
-        for step in self._steps(source, target) or ():
+        cautions, parameter = {}, task.parameter
+        for step in self._steps(task.source, task.target) or ():
             sentence = f"beyond {step.turns_at:.3g} the formula {step.text} turns around"
             cautions[sentence] = parameter > step.turns_at
             parameter = step.function(parameter)
         return cautions
 
     def _steps(self, source: Distribution, target: Distribution) -> list[ParameterMap] | None:
-        first, forward = to_root(source, same_lobe=False)
-        last, _ = to_root(target, same_lobe=False)
+        first, forward, _ = to_root(source, same_lobe=False)
+        last, _, back = to_root(target, same_lobe=False)
         path = self._path(first, last)
-        return None if path is None else [*forward, *path, *from_root(target, same_lobe=False)]
+        return None if path is None else [*forward, *path, *back]
 
     def _path(self, source: Distribution, target: Distribution) -> list[ParameterMap] | None:
         # Formulas speak of the distributions as they stand in the registry.
@@ -162,9 +152,10 @@ _SWEEP = {
 }
 
 
-def _turning_point(linear: float, cubic: float) -> float:
-    """Return where linear x − cubic x³ has its maximum."""
-    return float(np.sqrt(linear / (3 * cubic)))
+def _cubic(text: str, linear: float, cubic: float) -> ParameterMap:
+    """Return linear x − cubic x³, which turns around where it has a maximum."""
+    turns_at = float(np.sqrt(linear / (3 * cubic))) if cubic > 0 else float("inf")
+    return ParameterMap(text, lambda x: x * (linear - cubic * x * x), turns_at)
 
 
 _FORMULAS = {
@@ -174,14 +165,8 @@ _FORMULAS = {
     ("blinn-phong", "beckmann"): ParameterMap(
         "m_B = √2/√(N+2.5) (eq. 12)", lambda n: np.sqrt(2) / np.sqrt(n + 2.5)
     ),
-    ("beckmann", "gauss"): ParameterMap(
-        "m_G = 0.5591 m_B³ + m_B (eq. 13)", lambda m: m * (1 + 0.5591 * m * m)
-    ),
-    ("gauss", "beckmann"): ParameterMap(
-        "m_B = m_G − 0.4134 m_G³ (eq. 13)",
-        lambda m: m * (1 - 0.4134 * m * m),
-        _turning_point(1, 0.4134),
-    ),
+    ("beckmann", "gauss"): _cubic("m_G = 0.5591 m_B³ + m_B (eq. 13)", 1, -0.5591),
+    ("gauss", "beckmann"): _cubic("m_B = m_G − 0.4134 m_G³ (eq. 13)", 1, 0.4134),
     ("gauss", "blinn-phong"): ParameterMap("N = 2/m_G² − 0.5 (eq. 14)", lambda m: 2 / m**2 - 0.5),
     ("blinn-phong", "gauss"): ParameterMap(
         "m_G = √2/√(N+0.5) (eq. 14)", lambda n: np.sqrt(2) / np.sqrt(n + 0.5)
@@ -192,25 +177,15 @@ _FORMULAS = {
     ("sawicki", "blinn-phong"): ParameterMap(
         "N = (N_DS − 0.3)/1.174 (eq. 15)", lambda n: (n - 0.3) / 1.174
     ),
-    ("ggx", "gauss"): ParameterMap(
-        "m_G = 0.8222 C + 0.82 C³ (Table 3)", lambda c: c * (0.8222 + 0.82 * c * c)
-    ),
+    ("ggx", "gauss"): _cubic("m_G = 0.8222 C + 0.82 C³ (Table 3)", 0.8222, -0.82),
     ("ggx", "beckmann"): ParameterMap(
         "m_B = 0.8388 C + 0.7 C⁴ (Table 3)", lambda c: c * (0.8388 + 0.7 * c**3)
     ),
     ("ggx", "blinn-phong"): ParameterMap(
         "N = 1.696²/C² − 4.5 (Table 3)", lambda c: 1.696**2 / c**2 - 4.5
     ),
-    ("gauss", "ggx"): ParameterMap(
-        "C = 1.186 m_G − 0.835 m_G³ (Table 4)",
-        lambda m: m * (1.186 - 0.835 * m * m),
-        _turning_point(1.186, 0.835),
-    ),
-    ("beckmann", "ggx"): ParameterMap(
-        "C = 1.2 m_B − 0.56 m_B³ (Table 4)",
-        lambda m: m * (1.2 - 0.56 * m * m),
-        _turning_point(1.2, 0.56),
-    ),
+    ("gauss", "ggx"): _cubic("C = 1.186 m_G − 0.835 m_G³ (Table 4)", 1.186, 0.835),
+    ("beckmann", "ggx"): _cubic("C = 1.2 m_B − 0.56 m_B³ (Table 4)", 1.2, 0.56),
     ("blinn-phong", "ggx"): ParameterMap(
         "C = 1.697/√(N+4.5) (Table 4)", lambda n: 1.697 / np.sqrt(n + 4.5)
     ),
@@ -220,9 +195,8 @@ _FORMULAS = {
 @lru_cache(maxsize=64)
 def _sweep(source: Distribution) -> list[float]:
     """Return the ends of the paper's sweep in the parameter of a distribution."""
-    root, _ = to_root(source, same_lobe=False)
-    ends = np.array(_SWEEP[root.name])
-    return [float(f"{end:.6g}") for end in follow(from_root(source, same_lobe=False), ends)]
+    root, _, back = to_root(source, same_lobe=False)
+    return [float(f"{end:.6g}") for end in follow(back, np.array(_SWEEP[root.name]))]
 
 
 class ClosedForm(FormulaMethod):
@@ -238,17 +212,15 @@ class ClosedForm(FormulaMethod):
     # All formulas of Sawicki's distribution lead through Blinn/Phong.
     through: ClassVar = {"sawicki": "blinn-phong"}
 
-    def cautions(
-        self, parameter: Array, result: Array, source: Distribution, target: Distribution
-    ) -> dict[str, Mask]:
+    def cautions(self, task: ConversionTask, result: Array) -> dict[str, Mask]:
         """Add to the turning points whether the source is outside the paper's sweep."""
+        source, parameter = task.source, task.parameter
         lower, upper = _sweep(source)
         outside = (
             f"outside the paper's sweep: its formulas were fitted for {source.name} "
             f"{source.parameter.symbol} from {number_text(lower)} to {number_text(upper)}"
         )
-        turned = super().cautions(parameter, result, source, target)
-        return {outside: (parameter < lower) | (parameter > upper)} | turned
+        return {outside: (parameter < lower) | (parameter > upper)} | super().cautions(task, result)
 
 
 class HalfAngle(Method):
@@ -261,12 +233,9 @@ class HalfAngle(Method):
     preserves = "angle of half height"
     step = "β_half of the source = β_half of the target"
 
-    def convert(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> Array:
+    def convert(self, task: ConversionTask) -> Array:
         """Go through tan β_half; NaN where a distribution never falls to one half."""
-        result: Array = target.from_half_tangent(source.half_tangent(parameter))
-        return result
+        return task.target.from_half_tangent(task.source.half_tangent(task.parameter))
 
 
 class Ward(FormulaMethod):
@@ -293,12 +262,9 @@ class Peak(Method):
     preserves = "peak of the normalized form"
     step = "D(0) of the source = D(0) of the target"
 
-    def convert(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> Array:
+    def convert(self, task: ConversionTask) -> Array:
         """Go through the α with that peak; NaN where the target has no such peak."""
-        result: Array = target.from_peak_alpha(source.peak_alpha(parameter))
-        return result
+        return task.target.from_peak_alpha(task.source.peak_alpha(task.parameter))
 
 
 class LeastSquares(Method):
@@ -312,20 +278,17 @@ class LeastSquares(Method):
     step = "least squares"
     follows_metric = True
 
-    def convert(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> Array:
+    def convert(self, task: ConversionTask) -> Array:
         """Fit every value; NaN where the fit tends to the open end of the legal range."""
         from mdfconv.fitting.solve import fit
 
-        return fit(source, parameter.ravel(), target, metric).parameter.reshape(parameter.shape)
+        fits = fit(task.source, task.parameter.ravel(), task.target, task.metric)
+        return fits.parameter.reshape(task.parameter.shape)
 
-    def cautions(
-        self, parameter: Array, result: Array, source: Distribution, target: Distribution
-    ) -> dict[str, Mask]:
+    def cautions(self, task: ConversionTask, result: Array) -> dict[str, Mask]:
         """Say where the best fit is the end of the target's range."""
-        limits = target.parameter
-        sentence = f"the best fit lies at the end of the legal range of {target.name}"
+        limits = task.target.parameter
+        sentence = f"the best fit lies at the end of the legal range of {task.target.name}"
         return {sentence: (result == limits.upper) & limits.upper_closed}
 
 
@@ -356,18 +319,14 @@ class Fast(Method):
         """Return whether there is a map, one to make others from, or a constant."""
         return _stored(source, target, metric).known
 
-    def convert(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> Array:
+    def convert(self, task: ConversionTask) -> Array:
         """Evaluate the polynomials; NaN outside their range."""
-        stored = _stored(source, target, metric)
-        if len(metric.from_stored()) > 1 and not stored.exact:
-            from mdfconv.fitting.maps import made_map
-
-            if parameter.size < _MANY:
-                return LeastSquares().convert(parameter, source, target, metric)
-            stored = stored.with_map(made_map(*stored.pair, str(metric)))
-        return stored(parameter)
+        stored = _stored(task.source, task.target, task.metric)
+        if len(task.metric.from_stored()) > 1 and not stored.exact:
+            if task.parameter.size < _MANY:
+                return LeastSquares().convert(task)
+            stored = stored.with_map(made_map(*stored.pair, str(task.metric)))
+        return stored(task.parameter)
 
     def range_text(self, source: Distribution, target: Distribution, metric: Metric) -> str:
         """Return which parameters of the source the stored maps cover."""
@@ -382,44 +341,35 @@ def _stored(source: Distribution, target: Distribution, metric: Metric) -> Store
 class BestFit(LeastSquares):
     """The fit, from the stored polynomials as far as they reach."""
 
-    def convert(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> Array:
+    def convert(self, task: ConversionTask) -> Array:
         """Take the stored fits, and fit what they do not cover."""
-        result = self._stored(parameter, source, target, metric)
+        result = self._stored(task)
         missing = np.isnan(result)
         if missing.any():
-            result[missing] = super().convert(parameter[missing], source, target, metric)
+            result[missing] = super().convert(task.part(missing))
         return result
 
-    def answered_by(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> list[str]:
+    def answered_by(self, task: ConversionTask) -> list[str]:
         """Return "fast" where the stored fits reach, else "fit"."""
-        missing = np.isnan(self._stored(parameter, source, target, metric))
+        missing = np.isnan(self._stored(task))
         return np.where(missing, self.name, Fast.name).tolist()
 
-    def _stored(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> Array:
+    def _stored(self, task: ConversionTask) -> Array:
         """Return the stored fits, NaN where there is none."""
-        fast = Fast()
-        if not fast.covers(source, target, metric):
-            return np.full(parameter.shape, np.nan)
-        return fast.convert(parameter, source, target, metric)
+        if not Fast().covers(task.source, task.target, task.metric):
+            return np.full(task.parameter.shape, np.nan)
+        return Fast().convert(task)
 
 
 class FreeGammaFit(LeastSquares):
     """The fit of both parameters of a target that has two."""
 
-    def solve(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> Solution:
+    def solve(self, task: ConversionTask) -> Solution:
         """Fit both parameters."""
         from mdfconv.fitting.free_gamma import fit_free_gamma
 
-        fits = fit_free_gamma(source, parameter.ravel(), target, metric)
-        shape = parameter.shape
+        fits = fit_free_gamma(task.source, task.parameter.ravel(), task.target, task.metric)
+        shape = task.parameter.shape
         return Solution(
             fits.parameter.reshape(shape), fits.gamma.reshape(shape), fits.at_limit.reshape(shape)
         )
@@ -433,11 +383,9 @@ class ExactRoute(Method):
     def __init__(self, steps: Sequence[ParameterMap]) -> None:
         self._steps = steps
 
-    def convert(
-        self, parameter: Array, source: Distribution, target: Distribution, metric: Metric
-    ) -> Array:
+    def convert(self, task: ConversionTask) -> Array:
         """Take the steps one after the other."""
-        return follow(self._steps, parameter)
+        return follow(self._steps, task.parameter)
 
 
 _REGISTRY: Registry[Method] = Registry("method")

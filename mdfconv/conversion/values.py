@@ -12,20 +12,14 @@ from typing import Any, Literal, TypeAlias, TypedDict, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mdfconv.conversion.methods import (
-    ExactRoute,
-    check_covered,
-    default_method,
-    list_methods,
-    method_named,
-    method_with_free_gamma,
-)
+from mdfconv.conversion import methods
 from mdfconv.distributions import list_distributions
 from mdfconv.distributions.endpoint import Endpoint, endpoints, exact_route
 from mdfconv.distributions.evaluation import Array, Mask, as_operand, in_parts, worth_threads
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError, MdfconvWarning
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
+from mdfconv.fitting.problem import ConversionTask
 
 FREE: Literal["free"] = "free"
 Gamma: TypeAlias = float | Literal["free"] | None
@@ -34,7 +28,6 @@ Pair: TypeAlias = tuple[float, float]
 Value: TypeAlias = float | Pair
 
 _Word: TypeAlias = str | None
-_PairOfArrays: TypeAlias = tuple[ArrayLike, ArrayLike]
 # Fewer numbers are all looked at sooner than their extremes are found.
 _FEW = 16
 
@@ -66,7 +59,7 @@ def convert(  # type: ignore[overload-overlap]  # a pair of numbers is an array_
 ) -> Pair: ...
 @overload
 def convert(
-    values: _PairOfArrays,
+    values: tuple[ArrayLike, ArrayLike],
     source: Name,
     target: Name,
     method: _Word = ...,
@@ -160,12 +153,13 @@ def holds_pairs(values: Any) -> bool:
     if not isinstance(values, list):
         return False
     kinds = set(map(type, values))
-    return any(map(_is_pair, kinds)) or (list in kinds and any(map(holds_pairs, values)))
+    pairs = any(issubclass(kind, tuple) for kind in kinds)
+    return pairs or (list in kinds and any(map(holds_pairs, values)))
 
 
 def in_order(values: list[Any], convert_part: Callable[[Any], list[Any]]) -> list[Any]:
     """Convert the pairs of a list and its numbers, each at once; return all in their order."""
-    paired = list(map(_is_pair, map(type, values)))
+    paired = [isinstance(value, tuple) for value in values]
     pairs = list(compress(values, paired))
     numbers = list(compress(values, map(not_, paired)))
     for pair in pairs:
@@ -175,10 +169,6 @@ def in_order(values: list[Any], convert_part: Callable[[Any], list[Any]]) -> lis
     results = iter(convert_part(tuple(map(list, zip(*pairs, strict=True)))))
     others = iter(convert_part(numbers) if numbers else ())
     return [next(results if is_pair else others) for is_pair in paired]
-
-
-def _is_pair(kind: type) -> bool:
-    return issubclass(kind, tuple)
 
 
 def listed(result: Any) -> list[Any]:
@@ -219,14 +209,14 @@ class ConversionRule:
         self.pair = self.source.distribution, self.target.distribution
         self.metric = metric_or_default(metric)
         if self.free:
-            self.method = method_with_free_gamma(method, self.pair[1])
+            self.method = methods.method_with_free_gamma(method, self.pair[1])
         elif method is not None:
-            self.method = method_named(method)
+            self.method = methods.method_named(method)
         else:
-            self.method = default_method(*self.pair, metric_given=metric is not None)
+            self.method = methods.default_method(*self.pair, metric_given=metric is not None)
         self._same_lobes = exact_route(*self.pair)
         self.exact = None if self.free else self._same_lobes
-        self.solver = self.method if self.exact is None else ExactRoute(self.exact)
+        self.solver = self.method if self.exact is None else methods.ExactRoute(self.exact)
 
     def read(self, values: Any) -> tuple[Any, ...]:
         """Return values as real operands: one of numbers, or two of a pair, which is a tuple."""
@@ -270,9 +260,9 @@ class ConversionRule:
         else:
             parameter = self.source.decode(axis)
         if self.exact is None:
-            check_covered(self.method, self.metric, *self.ends)
+            methods.check_covered(self.method, self.metric, *self.ends)
         with np.errstate(all="ignore"):
-            solution = self.solver.solve(parameter, *self.pair, self.metric)
+            solution = self.solver.solve(self.task(parameter))
         stored = self.target.encode(solution.parameter)
         if not gaps and np.isnan(stored).any():
             index, size = int(np.argmax(np.isnan(stored))), np.size(stored)
@@ -280,6 +270,10 @@ class ConversionRule:
             result = solution.parameter.flat[index]
             raise self.refusal(float(parameter.flat[index]), float(result), which)
         return Converted(parameter, stored, *solution)
+
+    def task(self, parameter: Array) -> ConversionTask:
+        """Return what is to be done with parameters of the source."""
+        return ConversionTask(self.pair[0], parameter, self.pair[1], self.metric)
 
     def cautions(self, converted: Converted) -> dict[str, Mask]:
         """Return sentences, and of which of the numbers they are true."""
@@ -289,7 +283,8 @@ class ConversionRule:
         cautions |= {f"{self.target.label} clamps: {text}": clamped[text] for text in clamped}
         if self._same_lobes is None:
             with np.errstate(all="ignore"):
-                cautions |= self.method.cautions(converted.parameter, converted.result, *self.pair)
+                task = self.task(converted.parameter)
+                cautions |= self.method.cautions(task, converted.result)
         if converted.gamma_at_limit is not None:
             low, high = self.pair[1].parameters[1].fit_range
             sentence = (
@@ -331,11 +326,11 @@ class ConversionRule:
     def _other_answers(self, parameter: float) -> str:
         """Return what the other methods make of a parameter, in words."""
         answers: list[str] = []
-        for method in list_methods():
+        for method in methods.list_methods():
             if method.name == self.method.name or not method.covers(*self.pair, self.metric):
                 continue
             with np.errstate(all="ignore"):
-                result = method.convert(np.asarray([parameter]), *self.pair, self.metric)
+                result = method.convert(self.task(np.asarray([parameter])))
             stored = self.target.encode(result)
             if self.target.stored.accepts(stored)[0]:
                 verb = "" if answers else " answers"

@@ -16,7 +16,8 @@ from mdfconv.distributions.parameter import Encoding, Parameter, number_text
 from mdfconv.errors import MdfconvError
 
 
-def _identity(parameter: Array) -> Array:
+def same(parameter: Any, *gamma: Any) -> Any:
+    """Return the parameter."""
     return parameter
 
 
@@ -30,15 +31,15 @@ class Equivalent:
 
     name: str
     same_lobe: bool = True
-    forward: Callable[[Array], Array] = _identity
-    backward: Callable[[Array], Array] = _identity
+    forward: Callable[[Array], Array] = same
+    backward: Callable[[Array], Array] = same
     forward_text: str = ""
     backward_text: str = ""
 
     @property
     def same_parameter(self) -> bool:
         """Whether the two parameters are the same number."""
-        return self.forward is _identity
+        return self.forward is same
 
 
 @dataclass(frozen=True)
@@ -50,10 +51,10 @@ class MapVariables:
     of the source and the product x² κ.
     """
 
-    width: Callable[[Array], Array]
-    from_width: Callable[[Array], Array]
     concentration: Callable[[Array], Array]
     from_map: Callable[[Array, Array], Array]
+    width: Callable[[Array], Array] = same
+    from_width: Callable[[Array], Array] = same
 
 
 @dataclass(frozen=True)
@@ -86,11 +87,6 @@ class Printed:
         )
 
 
-def same(parameter: Any, *gamma: Any) -> Any:
-    """Return the parameter."""
-    return parameter
-
-
 def gamma_parameter(
     typical: tuple[float, float], limits: tuple[float, float], fitted: tuple[float, float]
 ) -> Parameter:
@@ -100,8 +96,6 @@ def gamma_parameter(
 
 
 ALPHA_MAP = MapVariables(
-    width=same,
-    from_width=same,
     concentration=lambda alpha: (1 - alpha) * (1 + alpha) / (alpha * alpha),
     from_map=lambda x, product: x / np.sqrt(x * x + product),
 )
@@ -116,6 +110,14 @@ class Options(TypedDict, total=False):
 
     phi: ArrayLike | None
     gamma: ArrayLike | None
+    threads: int
+
+
+class CumulativeOptions(TypedDict, total=False):
+    """The options of `Distribution.cumulative`."""
+
+    gamma: ArrayLike | None
+    complement: bool
     threads: int
 
 
@@ -309,32 +311,18 @@ class Distribution(ABC):
     @overload
     def normalized(self, beta: ArrayLike, parameter: Any, **options: Unpack[Options]) -> Array: ...
 
-    def normalized(
-        self,
-        beta: ArrayLike,
-        parameter: Any,
-        *,
-        phi: ArrayLike | None = None,
-        gamma: ArrayLike | None = None,
-        threads: int = 1,
-    ) -> Any:
+    def normalized(self, beta: ArrayLike, parameter: Any, **options: Unpack[Options]) -> Any:
         """Evaluate the normalized form D, for which ∫ D cos β dω = 1.
 
         Parameters, shapes and errors are those of `unit`; the result is in 1/sr.
         """
-        return self._evaluate("_normalized", beta, parameter, phi, gamma, threads)
+        return self._evaluate("_normalized", beta, parameter, **options)
 
     @overload
     def cumulative(self, beta: float, parameter: float, *, complement: bool = ...) -> float: ...
     @overload
     def cumulative(
-        self,
-        beta: ArrayLike,
-        parameter: ArrayLike,
-        *,
-        gamma: ArrayLike | None = ...,
-        complement: bool = ...,
-        threads: int = ...,
+        self, beta: ArrayLike, parameter: ArrayLike, **options: Unpack[CumulativeOptions]
     ) -> Array: ...
 
     def cumulative(
@@ -367,7 +355,7 @@ class Distribution(ABC):
         """
         angle = np.minimum(np.abs(as_operand(beta)), np.pi / 2)
         kernel = "_cumulative_tail" if complement else "_cumulative_lobe"
-        return self._evaluate(kernel, angle, parameter, None, gamma, threads)
+        return self._evaluate(kernel, angle, parameter, gamma=gamma, threads=threads)
 
     @overload
     def sample(self, share: float, parameter: float, *, complement: bool = ...) -> float: ...
@@ -606,9 +594,9 @@ class Distribution(ABC):
         kernel: str,
         beta: ArrayLike,
         parameter: Any,
-        phi: ArrayLike | None,
-        gamma: ArrayLike | None,
-        threads: int,
+        phi: ArrayLike | None = None,
+        gamma: ArrayLike | None = None,
+        threads: int = 1,
     ) -> Any:
         """Check the arguments and evaluate the kernel of a name in blocks."""
         if isinstance(parameter, tuple) or phi is not None:
@@ -630,9 +618,19 @@ class Distribution(ABC):
         self, kernel: str, beta: ArrayLike, pair: Any, phi: ArrayLike | None, threads: int
     ) -> Any:
         """Evaluate the kernel of a name for a pair of parameters and azimuths."""
-        raise MdfconvError(
-            f"{self.name} is isotropic here: it takes one parameter and no azimuth phi"
-        )
+        if self.anisotropic and not isinstance(pair, tuple):
+            raise MdfconvError("an azimuth phi needs a pair of parameters")
+        for_pair = getattr(self, f"{kernel}_pair", None)
+        if for_pair is None:
+            raise MdfconvError(
+                f"{self.name} is isotropic here: it takes one parameter and no azimuth phi"
+            )
+        if len(pair) != 2:
+            raise MdfconvError(f"a pair of parameters has two members, not {len(pair)}")
+        if phi is None:
+            raise MdfconvError("a pair of parameters needs an azimuth phi")
+        x, y = (self._held(value, beta, phi) for value in pair)
+        return evaluate(for_pair, beta, x, y, phi, threads=threads)
 
     def _held(self, parameter: ArrayLike, *others: Any) -> Any:
         """Return legal parameters that the type in which all is computed can hold."""
@@ -669,20 +667,6 @@ class AnisotropicDistribution(Distribution):
         self._lobe_pair(beta, x, y, phi, out)
         out *= self._finite(self._at_normal_pair(x, y))
 
-    def _evaluate_pair(
-        self, kernel: str, beta: ArrayLike, pair: Any, phi: ArrayLike | None, threads: int
-    ) -> Any:
-        if not isinstance(pair, tuple):
-            raise MdfconvError("an azimuth phi needs a pair of parameters")
-        if not hasattr(self, f"{kernel}_pair"):
-            return super()._evaluate_pair(kernel, beta, pair, phi, threads)
-        if len(pair) != 2:
-            raise MdfconvError(f"a pair of parameters has two members, not {len(pair)}")
-        if phi is None:
-            raise MdfconvError("a pair of parameters needs an azimuth phi")
-        x, y = (self._held(value, beta, phi) for value in pair)
-        return evaluate(getattr(self, f"{kernel}_pair"), beta, x, y, phi, threads=threads)
-
 
 class AlphaDistribution(Distribution):
     """A distribution whose parameter is the α of its peak: D(0) = 1/(π α²), or 1/(π α_x α_y)."""
@@ -715,6 +699,11 @@ def _positive(values: ArrayLike) -> Array:
     """Return real numbers as float64, NaN where they are not positive."""
     array = np.asarray(as_operand(values), dtype=float)
     return np.where(array > 0, array, np.nan)
+
+
+def negative_log_tail(lobe: Array, tail: Array) -> Array:
+    """Return −ln(1 − F) for F and 1 − F, from the one that has the digits."""
+    return np.where(lobe < tail, -np.log1p(-lobe), -np.log(tail))
 
 
 def find_root(function: Kernel, bracket: tuple[float, float], *arguments: Array) -> Array:

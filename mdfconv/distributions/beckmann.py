@@ -6,18 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import (
-    ALPHA_MAP,
-    AlphaDistribution,
-    AnisotropicDistribution,
-    Printed,
-)
-from mdfconv.distributions.evaluation import (
-    Array,
-    inverse_square,
-    negative_log_tail,
-    tangent_square,
-)
+from mdfconv.distributions import base
+from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
 from mdfconv.distributions.parameter import GLOSSINESS, ROUGHNESS, Parameter
 
 _NEWTON_STEPS = 12
@@ -42,7 +32,7 @@ def _printed_from_cosine(c: Any) -> Any:
     return np.tan(np.arccos(c)) / np.sqrt(float(np.log(2)) - 4 * np.log(c))
 
 
-class Beckmann(AlphaDistribution, AnisotropicDistribution):
+class Beckmann(base.AlphaDistribution, base.AnisotropicDistribution):
     """Gaussian slopes: Beckmann & Spizzichino 1963; Cook & Torrance 1981.
 
     Unit form, with t = tan β::
@@ -68,8 +58,8 @@ class Beckmann(AlphaDistribution, AnisotropicDistribution):
     scales_with_slope = True
     smith = True
     encodings = (ROUGHNESS, GLOSSINESS)
-    map_variables = ALPHA_MAP
-    printed = Printed.of_alpha(
+    map_variables = base.ALPHA_MAP
+    printed = base.Printed.of_alpha(
         _printed_unit, cosine=_printed_cosine, from_cosine=_printed_from_cosine
     )
 
@@ -99,7 +89,7 @@ class Beckmann(AlphaDistribution, AnisotropicDistribution):
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         # Walter et al. 2007, eq. (28).
-        return np.arctan(parameter * np.sqrt(negative_log_tail(lobe, tail)))
+        return np.arctan(parameter * np.sqrt(base.negative_log_tail(lobe, tail)))
 
     def smith_lambda(self, slope: Array) -> Array:
         """Return Λ = ½ (erf(a) − 1) + e^(−a²)/(2a√π), a = 1/slope (Heitz 2014, eq. 66)."""

@@ -6,15 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from mdfconv.distributions.base import (
-    AnisotropicDistribution,
-    Distribution,
-    Equivalent,
-    MapVariables,
-    Printed,
-    same,
-)
-from mdfconv.distributions.evaluation import Array, negative_log_tail, tangent_square
+from mdfconv.distributions import base
+from mdfconv.distributions.evaluation import Array, tangent_square
 from mdfconv.distributions.parameter import Encoding, Parameter
 
 # Phong's own exponent n, of the angle between the reflected ray and the viewer, which at normal
@@ -30,7 +23,7 @@ REFLECTED = Encoding(
 )
 
 
-class BlinnPhong(Distribution):
+class BlinnPhong(base.Distribution):
     """A power of the cosine: Phong 1975; Blinn 1977.
 
     Unit form::
@@ -57,13 +50,13 @@ class BlinnPhong(Distribution):
     parameters = (Parameter("exponent", "N", (1.0, 1e4), larger_is_smoother=True),)
     encodings = (REFLECTED,)
     operations = 20
-    map_variables = MapVariables(
+    map_variables = base.MapVariables(
         width=lambda n: np.sqrt(2 / (n + 2)),
         from_width=lambda x: 2 * (1 - x) * (1 + x) / (x * x),
-        concentration=same,
+        concentration=base.same,
         from_map=lambda x, product: product / (x * x),
     )
-    printed = Printed(
+    printed = base.Printed(
         lambda beta, n: np.cos(beta) ** n,
         lambda n: (n + 2) / (2 * np.pi),
         cosine=lambda n: 2 ** (-1 / n),
@@ -100,7 +93,7 @@ class BlinnPhong(Distribution):
         return -np.expm1(exponent), parameter * logarithm * np.exp(exponent)
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
-        exponent = 2 * negative_log_tail(lobe, tail) / (parameter + 2)
+        exponent = 2 * base.negative_log_tail(lobe, tail) / (parameter + 2)
         return np.arctan(np.sqrt(np.expm1(exponent)))
 
     def _half_tangent(self, parameter: Array) -> Array:
@@ -117,7 +110,7 @@ class BlinnPhong(Distribution):
         return 2 * (1 - alpha) * (1 + alpha) / np.square(alpha)
 
 
-class AshikhminShirley(BlinnPhong, AnisotropicDistribution):
+class AshikhminShirley(BlinnPhong, base.AnisotropicDistribution):
     """Blinn/Phong with an exponent for each axis: Ashikhmin & Shirley 2000.
 
     Unit form::
@@ -134,7 +127,7 @@ class AshikhminShirley(BlinnPhong, AnisotropicDistribution):
     normalized_formula = "√((N_x+2)(N_y+2))/(2π) cos^p β"
     source = "Ashikhmin & Shirley 2000; Pharr, Jakob & Humphreys 2016"
     parameters = (Parameter("exponents", "N", (1.0, 1e4), larger_is_smoother=True),)
-    equivalent = Equivalent("blinn-phong")
+    equivalent = base.Equivalent("blinn-phong")
 
     def _lobe_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
         self._lobe(beta, x * np.square(np.cos(phi)) + y * np.square(np.sin(phi)), out)

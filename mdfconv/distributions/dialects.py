@@ -13,15 +13,9 @@ from enum import StrEnum
 
 import numpy as np
 
+from mdfconv.distributions.base import same
 from mdfconv.distributions.evaluation import Array
-from mdfconv.distributions.parameter import (
-    ROUGHNESS,
-    Clamp,
-    Encoding,
-    Pairing,
-    Parameter,
-    percent_hint,
-)
+from mdfconv.distributions.parameter import Clamp, Encoding, Pairing, Parameter, percent_hint
 from mdfconv.errors import MdfconvError
 
 # From stored number or parameter, and the specular weight, to the other.
@@ -116,15 +110,10 @@ class Dialect:
         """
         weight = self._weight(setting)
 
-        def decode(stored: Array) -> Array:
-            return self.decode(stored, weight)
-
-        def encode(value: Array) -> Array:
-            return self.encode(value, weight)
-
         with np.errstate(all="ignore"):
             clamps = tuple(
-                replace(clamp, limit=float(decode(np.array(clamp.edge)))) for clamp in self.clamps
+                replace(clamp, limit=float(self.decode(np.array(clamp.edge), weight)))
+                for clamp in self.clamps
             )
         low, high = parameter.typical
         for clamp in clamps:
@@ -134,14 +123,14 @@ class Dialect:
                 low = max(low, clamp.limit / _SHORT_OF_CLAMP)
         # What cannot be stored is beyond the least number.
         ends = sorted(
-            float(np.nan_to_num(encode(np.array(end)), nan=self.stored.lower))
+            float(np.nan_to_num(self.encode(np.array(end), weight), nan=self.stored.lower))
             for end in (low, high)
         )
         return Encoding(
             f"{self.name}:{setting}" if setting else self.name,
             replace(self.stored, typical=(ends[0], min(ends[1], 1.0))),
-            decode,
-            encode,
+            lambda stored: self.decode(stored, weight),
+            lambda value: self.encode(value, weight),
             self.formula,
             clamps,
             self.pairing,
@@ -262,15 +251,8 @@ _GLTF_ANISOTROPY = Pairing(
 )
 
 
-def _same(stored: Array) -> Array:
-    return stored
-
-
 # α = r², of each axis.
-_SQUARE: tuple[_Rule, _Rule] = (
-    lambda r, weight: ROUGHNESS.decode(r),
-    lambda alpha, weight: ROUGHNESS.encode(alpha),
-)
+_SQUARE: tuple[_Rule, _Rule] = (lambda r, weight: np.square(r), lambda a, weight: np.sqrt(a))
 _PHONG = ("blinn-phong",)
 _GGX, _SLOPES = ("ggx",), ("ggx", "beckmann")
 _TO_MIRROR = (Clamp(0.0, 0.0),)
@@ -279,8 +261,7 @@ DIALECTS = (
     Dialect(
         "blender-obj", _PHONG, "r = 1 − √(N/1000)", *_falling(1000, 2),
         "Blender, OBJ import and export", "wavefront_obj/importer/obj_import_mtl.cc",
-        clamps=_TO_MIRROR, roughness=_same,
-        generators=("blender i/o", "khronos blender"),
+        clamps=_TO_MIRROR, roughness=same, generators=("blender i/o", "khronos blender"),
         provided="if its materials came from a Wavefront OBJ",
     ),
     Dialect(
@@ -288,25 +269,23 @@ DIALECTS = (
         lambda r, weight: 1000 * (1 - r / _obj2gltf(weight)),
         lambda n, weight: np.maximum(1 - n / 1000, 0) * _obj2gltf(weight),
         "CesiumGS obj2gltf", "lib/loadMtl.js",
-        clamps=_TO_MIRROR, specular=Specular.optional, roughness=_same,
-        generators=("obj2gltf",),
+        clamps=_TO_MIRROR, specular=Specular.optional, roughness=same, generators=("obj2gltf",),
     ),
     Dialect(
         "assimp-gltf", _PHONG, "r = 1 − L √(N/1000)", *_falling(1000, 2),
         "assimp, glTF 2 export", "code/AssetLib/glTF2/glTF2Exporter.cpp",
-        clamps=_TO_MIRROR, specular=Specular.needed, roughness=_same,
+        clamps=_TO_MIRROR, specular=Specular.needed, roughness=same,
         generators=("assimp", "open asset import library"),
     ),
     Dialect(
         "fbx", _PHONG, "r = 1 − √N/10", *_falling(100, 2),
         "assimp, Blender and ufbx, FBX import (ufbx OBJ, too)",
         "code/AssetLib/FBX/FBXConverter.cpp; io_scene_fbx/import_fbx.py; ufbx.c",
-        clamps=_TO_MIRROR, roughness=_same,
+        clamps=_TO_MIRROR, roughness=same,
     ),
     Dialect(
         "unity-fbx", _PHONG, "s = √(N/100)",
-        lambda s, weight: 100 * s**2,
-        lambda n, weight: np.minimum(np.sqrt(n / 100), 1),
+        lambda s, weight: 100 * s**2, lambda n, weight: np.minimum(np.sqrt(n / 100), 1),
         "Unity URP, model import", "FBXMaterialDescriptionPreprocessor.cs",
         _SMOOTHNESS, clamps=(Clamp(1.0, 1.0),), roughness=lambda s: 1 - s,
     ),
@@ -315,7 +294,7 @@ DIALECTS = (
         "FBX2glTF, Filament, Falcor, conway (IFC), trimesh COLLADA",
         "src/gltf/Raw2Gltf.cpp; libs/filamentapp/src/MeshAssimp.cpp; AssimpImporter.cpp; "
         "trimesh/exchange/dae.py",
-        _ABOVE_ZERO, roughness=_same, note="α stored as roughness: one square root short",
+        _ABOVE_ZERO, roughness=same, note="α stored as roughness: one square root short",
         generators=("fbx2gltf",),
     ),
     Dialect(
@@ -323,8 +302,7 @@ DIALECTS = (
         "trimesh OBJ, O3DE, Panda3D",
         "trimesh/visual/material.py; MaterialConverterSystemComponent.cpp; "
         "panda/src/gobj/material.cxx",
-        _ABOVE_ZERO, roughness=_same,
-        generators=("trimesh",),
+        _ABOVE_ZERO, roughness=same, generators=("trimesh",),
     ),
     Dialect(
         "babylon", _PHONG, "r = 0.1 + 0.9 (1 − (N/1300)^⅓)³",
@@ -336,45 +314,39 @@ DIALECTS = (
         ) ** 3,
         "Babylon.js, glTF export", "glTFMaterialExporter.ts",
         replace(_ROUGHNESS, lower=_BABYLON_LEAST),
-        clamps=(Clamp(_BABYLON_LEAST, _BABYLON_LEAST),), roughness=_same,
-        note="its test: N = 64 gives 0.328809",
-        generators=("babylon",),
+        clamps=(Clamp(_BABYLON_LEAST, _BABYLON_LEAST),), roughness=same,
+        note="its test: N = 64 gives 0.328809", generators=("babylon",),
     ),
     Dialect(
         "vtk-gltf", _PHONG, "r = 1/(1 + 0.2 L N)",
         lambda r, weight: 5 * (1 - r) / (r * weight),
         lambda n, weight: 1 / (1 + 0.2 * weight * n),
         "VTK, glTF export", "IO/Export/vtkGLTFExporter.cxx",
-        _ABOVE_ZERO, specular=Specular.needed, roughness=_same,
-        generators=("vtk",),
+        _ABOVE_ZERO, specular=Specular.needed, roughness=same, generators=("vtk",),
     ),
     Dialect(
         "ifcopenshell-gltf", _PHONG, "r = 1/N",
         lambda r, weight: 1 / r, lambda n, weight: 1 / n,
-        "IfcOpenShell", "mapping.cpp", _ABOVE_ZERO, roughness=_same,
-        generators=("ifcopenshell",),
+        "IfcOpenShell", "mapping.cpp",
+        _ABOVE_ZERO, roughness=same, generators=("ifcopenshell",),
     ),
     Dialect(
         "mmd-tools", _PHONG, "r = 1/max(N, 1)^0.37",
-        lambda r, weight: r ** (-1 / _MMD_POWER),
-        lambda n, weight: np.maximum(n, 1) ** -_MMD_POWER,
+        lambda r, weight: r ** (-1 / _MMD_POWER), lambda n, weight: np.maximum(n, 1) ** -_MMD_POWER,
         "Blender mmd_tools", "mmd_tools/core/material.py",
-        _ABOVE_ZERO, clamps=(Clamp(1.0, 1.0, above=False),), roughness=_same,
+        _ABOVE_ZERO, clamps=(Clamp(1.0, 1.0, above=False),), roughness=same,
     ),
     Dialect(
         "adobe-usd", _PHONG, "r = √(2/(L N + 2)), 0 where that is below 0.08",
         _inverse_power(2)[0],
-        lambda n, weight: np.where(
-            (r := _inverse_power(2)[1](n, weight)) < _ADOBE_LEAST, 0, r
-        ),
+        lambda n, weight: np.where((r := _inverse_power(2)[1](n, weight)) < _ADOBE_LEAST, 0, r),
         "Adobe USD plugins", "utils/src/materials.cpp",
         replace(_ROUGHNESS, lower=_ADOBE_LEAST), clamps=(Clamp(0.0, _ADOBE_LEAST),),
-        specular=Specular.needed, roughness=_same,
+        specular=Specular.needed, roughness=same,
     ),
     Dialect(
         "adobe-fbx", _PHONG, "N = 100 (1 − r)",
-        lambda r, weight: 100 * (1 - r),
-        lambda n, weight: np.maximum(1 - n / 100, 0),
+        lambda r, weight: 100 * (1 - r), lambda n, weight: np.maximum(1 - n / 100, 0),
         "Adobe USD plugins, FBX export", "utils/src/materials.cpp",
         clamps=_TO_MIRROR, note="what it makes of a roughness",
     ),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -60,7 +60,9 @@ class Endpoint:
 
     def decode(self, values: ArrayLike) -> Array:
         """Return the parameters (float64) for stored values; raise if one is illegal."""
-        self._check_clamps(values)
+        for text, which in self.clamped(np.asarray(values)).items():
+            if np.any(which):
+                raise MdfconvError(f"{self.label} has no inverse here: {text}")
         stored = np.asarray(self.stored.check(values, self.label), dtype=np.float64)
         with np.errstate(all="ignore"):
             parameter = self.encoding.decode(stored) if self.encoding else stored
@@ -131,12 +133,6 @@ class Endpoint:
                 f"{self.pairing.second.legal}, and x is the rougher axis"
             )
         return _plain(first), _plain(second)
-
-    def _check_clamps(self, values: ArrayLike) -> None:
-        stored = np.asarray(values)
-        for text, which in self.clamped(stored).items():
-            if np.any(which):
-                raise MdfconvError(f"{self.label} has no inverse here: {text}")
 
 
 def _plain(numbers: Array) -> Any:
@@ -283,38 +279,33 @@ class ParameterMap:
     turns_at: float = float("inf")
 
 
-def to_root(mdf: Distribution, *, same_lobe: bool) -> tuple[Distribution, Sequence[ParameterMap]]:
-    """Return the distribution in whose parameter another one can be expressed, and how.
+Steps: TypeAlias = Sequence[ParameterMap]
+
+
+def to_root(mdf: Distribution, *, same_lobe: bool) -> tuple[Distribution, Steps, Steps]:
+    """Return the distribution in whose parameter another one can be expressed, the steps and back.
 
     A distribution is its own root unless it declares an equivalent, which may have to have the
     same lobes.
     """
     equal = mdf.equivalent
     if equal is None or (same_lobe and not equal.same_lobe):
-        return mdf, ()
-    return distribution(equal.name), (ParameterMap(equal.forward_text, equal.forward),)
+        return mdf, (), ()
+    forward = ParameterMap(equal.forward_text, equal.forward)
+    backward = ParameterMap(equal.backward_text, equal.backward)
+    return distribution(equal.name), (forward,), (backward,)
 
 
-def from_root(mdf: Distribution, *, same_lobe: bool) -> Sequence[ParameterMap]:
-    """Return the steps from the root's parameter back, as for `to_root`."""
-    equal = mdf.equivalent
-    if equal is None or (same_lobe and not equal.same_lobe):
-        return ()
-    return (ParameterMap(equal.backward_text, equal.backward),)
-
-
-def exact_route(source: Distribution, target: Distribution) -> Sequence[ParameterMap] | None:
+def exact_route(source: Distribution, target: Distribution) -> Steps | None:
     """Return the steps between two distributions that have the same lobes; None for others."""
     if source.is_same(target):
         return ()
-    first, forward = to_root(source, same_lobe=True)
-    last, _ = to_root(target, same_lobe=True)
-    if not first.is_same(last):
-        return None
-    return (*forward, *from_root(target, same_lobe=True))
+    first, forward, _ = to_root(source, same_lobe=True)
+    last, _, back = to_root(target, same_lobe=True)
+    return (*forward, *back) if first.is_same(last) else None
 
 
-def follow(steps: Sequence[ParameterMap], parameter: Array) -> Array:
+def follow(steps: Steps, parameter: Array) -> Array:
     """Return what the steps make of parameters, one after the other; infinite at an end of both."""
     with np.errstate(all="ignore"):
         for step in steps:

@@ -53,16 +53,11 @@ def as_operand(values: ArrayLike) -> Any:
     if array.dtype.kind not in "fiu":
         raise MdfconvError(f"expected real numbers, got {array.dtype.name}")
     if array.dtype.kind == "f" and array.dtype.itemsize > np.dtype(float).itemsize:
-        _check_double(array)
+        with np.errstate(all="ignore"):
+            double = array.astype(float)
+        if ((np.isinf(double) & np.isfinite(array)) | ((double == 0) & (array != 0))).any():
+            raise MdfconvError("a number is too large or too small for float64")
     return array
-
-
-def _check_double(array: Array) -> None:
-    """Raise unless floats of a longer type are some in double precision, too."""
-    with np.errstate(all="ignore"):
-        double = array.astype(float)
-    if ((np.isinf(double) & np.isfinite(array)) | ((double == 0) & (array != 0))).any():
-        raise MdfconvError("a number is too large or too small for float64")
 
 
 def computing_dtype(*operands: Any) -> tuple[np.dtype[Any], np.dtype[Any]]:
@@ -173,11 +168,6 @@ def tangent_square(beta: Array, out: Array | None = None) -> Array:
     """Return tan²β, the variable in which the kernels keep their digits up to π/2."""
     tangent: Array = np.tan(beta, out=out)
     return np.square(tangent, out=tangent)
-
-
-def negative_log_tail(lobe: Array, tail: Array) -> Array:
-    """Return −ln(1 − F) for F and 1 − F, from the one that has the digits."""
-    return np.where(lobe < tail, -np.log1p(-lobe), -np.log(tail))
 
 
 @cache

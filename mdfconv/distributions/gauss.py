@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import Distribution, MapVariables, Printed, same
+from mdfconv.distributions.base import Distribution, MapVariables, Printed
 from mdfconv.distributions.evaluation import Array, gauss_legendre, inverse_square
 from mdfconv.distributions.parameter import Parameter
 
@@ -51,8 +51,6 @@ class Gauss(Distribution):
     parameters = (Parameter("width", "m_G", (0.01, 0.8)),)
     operations = 23
     map_variables = MapVariables(
-        width=same,
-        from_width=same,
         concentration=lambda m: 1 / (m * m),
         from_map=lambda x, product: x / np.sqrt(product),
     )

@@ -6,14 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mdfconv.distributions.base import (
-    BOUNDED_ALPHA_MAP,
-    AlphaDistribution,
-    AnisotropicDistribution,
-    Distribution,
-    Equivalent,
-    Printed,
-)
+from mdfconv.distributions import base
 from mdfconv.distributions.beckmann import slope_scale
 from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
 from mdfconv.distributions.parameter import GLOSSINESS, ROUGHNESS, Parameter
@@ -31,7 +24,7 @@ def printed_from_cosine(c: Any, gamma: Any) -> Any:
     return np.sqrt((c**2 - 1) / (c**2 - 2 ** (1 / gamma)))
 
 
-class GGX(AlphaDistribution, AnisotropicDistribution):
+class GGX(base.AlphaDistribution, base.AnisotropicDistribution):
     """Normals of an ellipsoid: Trowbridge & Reitz 1975; Walter et al. 2007.
 
     Unit form, with t = tan β::
@@ -60,8 +53,8 @@ class GGX(AlphaDistribution, AnisotropicDistribution):
         "alpha": "ggx",
         **dict.fromkeys(("glossiness", "gloss", "smoothness"), "ggx:glossiness"),
     }
-    map_variables = BOUNDED_ALPHA_MAP
-    printed = Printed.of_alpha(
+    map_variables = base.BOUNDED_ALPHA_MAP
+    printed = base.Printed.of_alpha(
         lambda beta, alpha: (alpha**2 / (np.cos(beta) ** 2 * (alpha**2 - 1) + 1)) ** 2,
         cosine=lambda alpha: printed_cosine(alpha, np.full_like(alpha, 2)),
         from_cosine=lambda c: printed_from_cosine(c, np.full_like(c, 2)),
@@ -128,10 +121,10 @@ def trowbridge_reitz_shares(beta: Array, scale: Array) -> tuple[Array, Array]:
     return ratio / (1 + ratio), 1 / (1 + ratio)
 
 
-def ggx_at_two(mdf: Distribution) -> Equivalent | None:
+def ggx_at_two(mdf: base.Distribution) -> base.Equivalent | None:
     """Return GGX as the equivalent of a distribution that it is at γ = 2."""
     text = f"{mdf.name} with γ = 2 is ggx"
-    return Equivalent("ggx", forward_text=text, backward_text=text) if mdf.gamma == 2 else None
+    return base.Equivalent("ggx", forward_text=text, backward_text=text) if mdf.gamma == 2 else None
 
 
 DISTRIBUTIONS = (GGX(),)

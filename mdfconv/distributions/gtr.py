@@ -6,14 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from mdfconv.distributions import ggx
 from mdfconv.distributions.base import Distribution, Equivalent, Printed, gamma_parameter
 from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
-from mdfconv.distributions.ggx import (
-    ggx_at_two,
-    printed_cosine,
-    printed_from_cosine,
-    trowbridge_reitz,
-)
 from mdfconv.distributions.parameter import Parameter
 
 
@@ -53,20 +48,20 @@ class GTR(Distribution):
     printed = Printed(
         lambda beta, alpha, gamma: (alpha**2 / (np.cos(beta) ** 2 * (alpha**2 - 1) + 1)) ** gamma,
         _printed_constant,
-        cosine=printed_cosine,
-        from_cosine=printed_from_cosine,
+        cosine=ggx.printed_cosine,
+        from_cosine=ggx.printed_from_cosine,
         peak_alpha=lambda alpha, gamma: 1 / np.sqrt(np.pi * _printed_constant(alpha, gamma)),
     )
 
     @property
     def equivalent(self) -> Equivalent | None:
         """GGX at γ = 2."""
-        return ggx_at_two(self)
+        return ggx.ggx_at_two(self)
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         scale = inverse_square(parameter)
         if np.size(self.gamma) == 1 and self.gamma == 2:
-            return trowbridge_reitz(beta, scale, out)
+            return ggx.trowbridge_reitz(beta, scale, out)
         # exp(−γ ln(1 + x)), x = sin²β (1−α²)/α²
         value = tangent_square(beta, out)
         value /= 1 + value

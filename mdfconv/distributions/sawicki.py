@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from mdfconv.distributions.base import Distribution, MapVariables, Printed, same
-from mdfconv.distributions.evaluation import Array, negative_log_tail, tangent_square
+from mdfconv.distributions import base
+from mdfconv.distributions.evaluation import Array, tangent_square
 from mdfconv.distributions.parameter import Parameter
 
 _NEWTON_STEPS = 12
 
 
-class Sawicki(Distribution):
+class Sawicki(base.Distribution):
     """A Padé-like stand-in for the power of the cosine: Sawicki 2006.
 
     Unit form, with c = cos β and v = 1 − c::
@@ -28,13 +28,13 @@ class Sawicki(Distribution):
     source = "Sawicki 2006"
     parameters = (Parameter("exponent", "N_DS", (1.0, 1e4), larger_is_smoother=True),)
     operations = 6
-    map_variables = MapVariables(
+    map_variables = base.MapVariables(
         width=lambda n: np.sqrt(8 / (3 * n + 9)),
         from_width=lambda x: 8 / (3 * x * x) - 3,
-        concentration=same,
+        concentration=base.same,
         from_map=lambda x, product: product / (x * x),
     )
-    printed = Printed(
+    printed = base.Printed(
         lambda beta, n: 256 * np.cos(beta) / ((1 - n) * np.cos(beta) + n + 3) ** 4,
         lambda n: 96 * (3 + n) / (256 * np.pi),
         from_cosine=lambda c: (c + 3 - 4 * (2 * c) ** 0.25) / (c - 1),
@@ -94,7 +94,7 @@ class Sawicki(Distribution):
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         # 1 − q for q³ of the tail, from the side that has the digits.
-        q = -np.expm1(-negative_log_tail(lobe, tail) / 3)
+        q = -np.expm1(-base.negative_log_tail(lobe, tail) / 3)
         k = 0.25 * (parameter - 1)
         drop = q / (1 + k * (1 - q))
         return 2 * np.arcsin(np.sqrt(0.5 * drop))

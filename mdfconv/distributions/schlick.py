@@ -7,12 +7,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from mdfconv.distributions.base import (
-    BOUNDED_ALPHA_MAP,
-    AlphaDistribution,
-    Equivalent,
-    Printed,
-)
+from mdfconv.distributions import base
 from mdfconv.distributions.evaluation import Array, tangent_square
 from mdfconv.distributions.parameter import Parameter
 
@@ -30,7 +25,7 @@ def _printed_unit(beta: Any, m: Any) -> Any:
     return np.where(x > 0, m**5 * x / (c * (m * x**2 - x**2 + m**2) ** 2), 0)
 
 
-class Schlick(AlphaDistribution):
+class Schlick(base.AlphaDistribution):
     """Beckmann as a rational function: Schlick 1994 (An Inexpensive BRDF Model).
 
     Unit form, with x = cos β + m − 1 ≥ 0 and 0 where x < 0::
@@ -49,14 +44,14 @@ class Schlick(AlphaDistribution):
     source = "Schlick 1994, An Inexpensive BRDF Model for Physically-Based Rendering"
     parameters = (Parameter("alpha", "m_B", (0.01, 0.8), upper=1.0, upper_closed=True),)
     operations = 8
-    equivalent = Equivalent(
+    equivalent = base.Equivalent(
         "beckmann",
         same_lobe=False,
         forward_text="schlick has beckmann's m_B",
         backward_text="schlick has beckmann's m_B",
     )
-    map_variables = BOUNDED_ALPHA_MAP
-    printed = Printed.of_alpha(_printed_unit)
+    map_variables = base.BOUNDED_ALPHA_MAP
+    printed = base.Printed.of_alpha(_printed_unit)
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
         # Angles often come sorted or in tiles: of whole blocks beyond the edge nothing is computed.

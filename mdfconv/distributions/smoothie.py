@@ -6,14 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from mdfconv.distributions import ggx
 from mdfconv.distributions.base import Distribution, Equivalent, MapVariables, Printed
 from mdfconv.distributions.evaluation import Array, inverse_square
-from mdfconv.distributions.ggx import (
-    printed_cosine,
-    printed_from_cosine,
-    trowbridge_reitz,
-    trowbridge_reitz_shares,
-)
 from mdfconv.distributions.parameter import Parameter
 
 _EXCESS = np.sqrt(2) - 1
@@ -69,14 +64,14 @@ class Smoothie(Distribution):
     printed = Printed(
         lambda beta, alpha: (alpha**2 / (alpha**2 + 4 * np.sin(beta) ** 2)) ** 2,
         lambda alpha: (alpha**2 + 4) / (np.pi * alpha**2),
-        cosine=lambda alpha: printed_cosine(_printed_to_ggx(alpha), np.full_like(alpha, 2)),
-        from_cosine=lambda c: _printed_from_ggx(printed_from_cosine(c, np.full_like(c, 2))),
+        cosine=lambda alpha: ggx.printed_cosine(_printed_to_ggx(alpha), np.full_like(alpha, 2)),
+        from_cosine=lambda c: _printed_from_ggx(ggx.printed_from_cosine(c, np.full_like(c, 2))),
         peak_alpha=_printed_to_ggx,
         from_peak_alpha=_printed_from_ggx,
     )
 
     def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
-        return trowbridge_reitz(beta, 1 + 4 * inverse_square(parameter), out)
+        return ggx.trowbridge_reitz(beta, 1 + 4 * inverse_square(parameter), out)
 
     def _at_normal(self, parameter: Array) -> Array:
         return (1 + 4 * inverse_square(parameter)) / np.pi
@@ -89,7 +84,7 @@ class Smoothie(Distribution):
         return -8 / (4 + np.square(parameter))
 
     def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        return trowbridge_reitz_shares(beta, 1 + 4 * inverse_square(parameter))
+        return ggx.trowbridge_reitz_shares(beta, 1 + 4 * inverse_square(parameter))
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         return np.arctan(to_ggx(parameter) * np.sqrt(lobe / tail))

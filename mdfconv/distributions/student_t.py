@@ -6,13 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions.base import AlphaDistribution, Equivalent, Printed, gamma_parameter
-from mdfconv.distributions.evaluation import (
-    Array,
-    inverse_square,
-    negative_log_tail,
-    tangent_square,
-)
+from mdfconv.distributions import base
+from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
 from mdfconv.distributions.ggx import ggx_at_two
 from mdfconv.distributions.parameter import Parameter
 
@@ -30,7 +25,7 @@ def _printed_unit(beta: Any, alpha: Any, gamma: Any) -> Any:
     return np.where(off_axis, value / maximum, value)
 
 
-class StudentT(AlphaDistribution):
+class StudentT(base.AlphaDistribution):
     """Slopes with the tails of a Student-t distribution: Ribardière et al. 2017.
 
     With t = tan β and x = t²/((γ−1) α²)::
@@ -51,11 +46,11 @@ class StudentT(AlphaDistribution):
     parameters = (
         Parameter("alpha", "α", (0.01, 0.8)),
         # Towards γ → ∞ it becomes Beckmann: the tails no longer tell γ, and 1/γ loses its digits.
-        gamma_parameter(typical=(2.0, 10.0), limits=(2.0, 1e6), fitted=(2.0, 512.0)),
+        base.gamma_parameter(typical=(2.0, 10.0), limits=(2.0, 1e6), fitted=(2.0, 512.0)),
     )
     operations = 26
     scales_with_slope = True
-    printed = Printed.of_alpha(
+    printed = base.Printed.of_alpha(
         _printed_unit,
         from_cosine=lambda c, gamma: (
             np.tan(np.arccos(c)) / np.sqrt((gamma - 1) * ((2 / c**4) ** (1 / gamma) - 1))
@@ -63,7 +58,7 @@ class StudentT(AlphaDistribution):
     )
 
     @property
-    def equivalent(self) -> Equivalent | None:
+    def equivalent(self) -> base.Equivalent | None:
         """GGX at γ = 2."""
         return ggx_at_two(self)
 
@@ -96,7 +91,7 @@ class StudentT(AlphaDistribution):
         return -np.expm1(exponent), np.exp(exponent)
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
-        x = np.expm1(negative_log_tail(lobe, tail) / (self.gamma - 1))
+        x = np.expm1(base.negative_log_tail(lobe, tail) / (self.gamma - 1))
         return np.arctan(parameter * np.sqrt((self.gamma - 1) * x))
 
     def mode(self, parameter: Array) -> Array:

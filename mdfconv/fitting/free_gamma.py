@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.evaluation import Array, Indices, Mask
+from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.problem import FitProblem, FitTask, bounded_tangent
+from mdfconv.fitting.problem import ConversionTask, FitProblem, bounded_tangent
 from mdfconv.fitting.quadrature import Quadrature, SmoothQuadrature
-from mdfconv.fitting.solve import candidates, descend
+from mdfconv.fitting.solve import Fit, batches, candidates, descend
 
 # Marquardt's factor of the diagonal: where it starts, what it falls and rises by, its least.
 _DAMPING, _LEAST_DAMPING = 1e-3, 1e-12
@@ -103,7 +103,7 @@ _AT_END = 1e-3
 
 
 @dataclass(frozen=True)
-class FreeFit:
+class FreeFit(Fit):
     """The best pairs of parameters of a batch of n problems.
 
     Parameters
@@ -117,10 +117,7 @@ class FreeFit:
         beyond it.
     """
 
-    parameter: Array
     gamma: Array
-    distance: Array
-    at_limit: Mask
 
 
 def fit_free_gamma(
@@ -147,20 +144,16 @@ def fit_free_gamma(
     shape = target.second_parameter
     if shape is None:
         raise MdfconvError(f"{target.name} has one parameter and no γ")
-    task = FitTask(source, parameter, target, metric, quadrature)
-    rows = np.arange(parameter.size)
+    task = ConversionTask(source, parameter, target, metric, quadrature)
     # Where nothing fits the result is NaN, which says so.
     with np.errstate(all="ignore"):
-        parts = [
-            _fit_batch(task, rows[start : start + _BATCH])
-            for start in range(0, parameter.size, _BATCH)
-        ]
+        parts = [_fit_batch(task, rows) for rows in batches(np.arange(parameter.size), _BATCH)]
     best, gamma, distance = np.concatenate(parts or [np.empty((3, 0))], axis=1)
     best[~np.isfinite(distance)] = np.nan
-    return FreeFit(best, gamma, distance, np.isin(gamma, shape.fit_range))
+    return FreeFit(best, distance, np.isin(gamma, shape.fit_range), gamma)
 
 
-def _fit_batch(task: FitTask, rows: Indices) -> Array:
+def _fit_batch(task: ConversionTask, rows: Indices) -> Array:
     """Return the first parameters, γ and distances of some of the fits, shape (3, rows)."""
     if task.quadrature is None and task.metric.over_angles:
         # The best lobes are about as wide as the source's.
@@ -184,7 +177,7 @@ def _fit_batch(task: FitTask, rows: Indices) -> Array:
     return np.stack([best, gamma, distance])
 
 
-def _start(task: FitTask, rows: Indices) -> Array:
+def _start(task: ConversionTask, rows: Indices) -> Array:
     """Return ln p and ln γ of the lowest of many candidates, shape (n, 2), inside the bounds."""
     every_row = np.arange(rows.size)
     lowest, start = np.full(rows.size, np.inf), np.zeros((rows.size, 2))

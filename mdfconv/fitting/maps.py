@@ -20,10 +20,10 @@ import numpy as np
 
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.base import MapVariables
-from mdfconv.distributions.endpoint import follow, from_root, to_root
+from mdfconv.distributions.endpoint import follow, to_root
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric, metric_named
-from mdfconv.fitting.problem import FitTask
+from mdfconv.fitting.problem import ConversionTask
 
 FILE = Path(__file__).parent / "data" / "maps.npz"
 # So many values and their intermediates stay in the cache; fewer would be computed no sooner, and
@@ -92,10 +92,8 @@ class StoredFit:
     """
 
     def __init__(self, source: Distribution, target: Distribution, metric: Metric) -> None:
-        self._first, self._forward = to_root(source, same_lobe=True)
-        self._last, _ = to_root(target, same_lobe=True)
-        self._back = from_root(target, same_lobe=True)
-        self._onward = from_root(source, same_lobe=True)
+        self._first, self._forward, self._onward = to_root(source, same_lobe=True)
+        self._last, _, self._back = to_root(target, same_lobe=True)
         self._symbol, self._above = source.parameter.symbol, source.parameter.larger_is_smoother
         self._ratio = metric.ratio(self._first, self._last)
         self.map: Map | None = None
@@ -263,12 +261,12 @@ def made_map(source: str, target: str, metric: str) -> Map:
     """
     from mdfconv.fitting.solve import follow_stored
 
-    task = FitTask(distribution(source), np.empty(0), distribution(target), metric_named(metric))
-    stored = StoredFit(task.source, task.target, task.metric.from_stored()[0])
+    ends = distribution(source), distribution(target)
+    stored = StoredFit(*ends, metric_named(metric).from_stored()[0])
     assert stored.map is not None, "asked only for a pair that has a map"
 
     def fits(parameter: Array) -> Array:
-        return follow_stored(task._replace(parameter=parameter)).fits
+        return follow_stored(ConversionTask(ends[0], parameter, ends[1], metric_named(metric))).fits
 
     maker = MapMaker(stored.variables, stored.map.factored, fits, _MADE_TOLERANCE, _MADE_NARROWEST)
     # The lobes' own bends stay where they are, what else there is is found.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.evaluation import Array, Indices
+from mdfconv.distributions.evaluation import Array, Indices, Mask
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.quadrature import Breaks, Quadrature, SmoothQuadrature
 
@@ -52,10 +52,10 @@ def level_crossing(
 _WIDEST_TANGENT = 20.0
 
 
-class FitTask(NamedTuple):
-    """What is fitted: a target in the place of each of n lobes of a source.
+class ConversionTask(NamedTuple):
+    """What is converted: n lobes of a source, to those of a target.
 
-    The metric says where the distance is sampled, unless there is a quadrature.
+    The metric says where the distance of a fit is sampled, unless there is a quadrature.
     """
 
     source: Distribution
@@ -64,13 +64,13 @@ class FitTask(NamedTuple):
     metric: Metric
     quadrature: Quadrature | None = None
 
-    def part(self, rows: Indices) -> FitTask:
+    def part(self, rows: Indices | Mask) -> ConversionTask:
         """Return the task for some of the lobes; not for one with a quadrature of its own."""
         return self._replace(parameter=self.parameter[rows])
 
     def problem(self, rows: Indices) -> FitProblem:
         """Return some of the lobes as a batch."""
-        return FitProblem(*self, rows)
+        return FitProblem(self, rows)
 
     def problem_near(self, near: Array) -> FitProblem:
         """Return all lobes as a batch whose minima are known to be near: a few angles do."""
@@ -84,33 +84,24 @@ class FitTask(NamedTuple):
 class FitProblem:
     """A batch of m fits: the distance of each, and its slope in ln p, p the target's parameter.
 
-    The first arguments are those of a `FitTask` of n lobes, of which `rows` make the batch.
+    The rows of a task make the batch.
     """
 
-    def __init__(
-        self,
-        source: Distribution,
-        parameter: Array,
-        target: Distribution,
-        metric: Metric,
-        quadrature: Quadrature | None,
-        rows: Indices,
-    ) -> None:
-        self.target, self.metric = target, metric
+    def __init__(self, task: ConversionTask, rows: Indices) -> None:
+        source, parameter, self.target, self.metric, quadrature = task
         self._source = source
         self._source_parameter = parameter[rows][:, None]
         # tan β_half of the source, at most that of a lobe as wide as the hemisphere.
         self.tangent = bounded_tangent(source, parameter[rows])
-        self._peak = source.maximum(self._source_parameter, normalized=metric.normalized)
+        self._peak = source.maximum(self._source_parameter, normalized=self.metric.normalized)
         if quadrature is None:
-            self._quadrature: Quadrature = metric.quadrature(np.arctan(self.tangent))
-            self._rows: Indices = np.arange(rows.size)
-        else:
-            self._quadrature, self._rows = quadrature, rows
+            quadrature = self.metric.quadrature(np.arctan(self.tangent))
+            rows = np.arange(rows.size)
+        self._quadrature, self._rows = quadrature, rows
         self._source_breaks = self._breaks(source, self._source_parameter, self._peak)
         # Unless the panels move with the target, all distances share their samples.
         self._samples: tuple[Array, Array, Array] | None = None
-        if not metric.kinks and target.edge(np.ones(1)) is None:
+        if not self.metric.kinks and self.target.edge(np.ones(1)) is None:
             self._samples = self._sampled(self._all, self._source_breaks)
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -12,7 +13,7 @@ from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, Indices, Mask
 from mdfconv.fitting.maps import StoredFit
 from mdfconv.fitting.metrics import Metric
-from mdfconv.fitting.problem import FitProblem, FitTask
+from mdfconv.fitting.problem import ConversionTask, FitProblem
 from mdfconv.fitting.quadrature import NO_BREAKS, Breaks, Quadrature, Samples
 
 # Even, so that every other knot is checked by its neighbours.
@@ -343,7 +344,7 @@ class Attempt:
         return np.where(self.settled, self.parameter, np.nan)
 
 
-def _interpolate(task: FitTask) -> Attempt:
+def _interpolate(task: ConversionTask) -> Attempt:
     """Settle what lies on a smooth curve through fits of fewer values."""
     parameter = task.parameter
     x = np.log(parameter)
@@ -360,7 +361,7 @@ def _interpolate(task: FitTask) -> Attempt:
     return Attempt(best, np.where(absent, np.inf, distance), absent | ~np.isnan(best))
 
 
-def follow_stored(task: FitTask) -> Attempt:
+def follow_stored(task: ConversionTask) -> Attempt:
     """Settle what a descent from the stored fit reaches, by way of metrics in between."""
     path = task.metric.from_stored()
     stored = StoredFit(task.source, task.target, path[0])
@@ -375,7 +376,7 @@ def follow_stored(task: FitTask) -> Attempt:
     return Attempt(start, attempt.distance, ~np.isnan(start)) if stored.exact else attempt
 
 
-def _follow(task: FitTask, steps: Sequence[Metric], start: Array) -> Attempt:
+def _follow(task: ConversionTask, steps: Sequence[Metric], start: Array) -> Attempt:
     """Descend under one metric after the other; the last step is settled if it is a short one."""
     if task.metric.root > 1 and task.target.edge(np.ones(1)) is not None:
         # A root of a lobe has a slope at its edge whose square has no integral: as the edge moves
@@ -383,7 +384,7 @@ def _follow(task: FitTask, steps: Sequence[Metric], start: Array) -> Attempt:
         return Attempt.nothing(start.size)
     accepts = task.target.parameter.accepts
     best, distance, before = np.full((3, task.parameter.size), np.nan)
-    for rows in _batches(np.flatnonzero(accepts(start)), _WARM_ROWS):
+    for rows in batches(np.flatnonzero(accepts(start)), _WARM_ROWS):
         part, near = task.part(rows), start[rows]
         with np.errstate(all="ignore"):
             for metric in steps[:-1]:
@@ -400,13 +401,11 @@ def _follow(task: FitTask, steps: Sequence[Metric], start: Array) -> Attempt:
 class FitCurve:
     """Fits of a few values, and those of others near a curve through them."""
 
-    def __init__(
-        self, source: Distribution, knots: Array, target: Distribution, metric: Metric
-    ) -> None:
-        self._problem = source, target, metric
-        fits = cold_fit(source, knots, target, metric)
-        order = np.argsort(knots)
-        x = np.log(knots[order])
+    def __init__(self, knots: ConversionTask) -> None:
+        self._task = knots
+        fits = _solved(knots, ((_search, 0),))
+        order = np.argsort(knots.parameter)
+        x = np.log(knots.parameter[order])
         known = ~np.isnan(fits.parameter[order]) & (np.diff(x, prepend=-np.inf) > 0)
         self._log_knots = x[known]
         self._log_fits = np.log(fits.parameter[order][known])
@@ -419,28 +418,27 @@ class FitCurve:
         """
         from scipy.interpolate import PchipInterpolator
 
-        source, target, metric = self._problem
+        task = self._task._replace(parameter=parameter)
         if self._log_knots.size < _LEAST_KNOTS:
             return Attempt.nothing(parameter.size)
         x = np.log(parameter)
         curve = PchipInterpolator(self._log_knots, self._log_fits, extrapolate=False)
-        steps = [metric] * (2 + _MORE_DESCENTS)
-        attempt = _follow(FitTask(source, parameter, target, metric), steps, np.exp(curve(x)))
+        attempt = _follow(task, [task.metric] * (2 + _MORE_DESCENTS), np.exp(curve(x)))
         usual = np.interp(x, self._log_knots, self._distances)
         settled = attempt.settled & (attempt.distance <= _AS_USUAL * usual)
-        if metric.similar_below:
-            settled &= ~(source.half_tangent(parameter) < metric.similar_below)
+        if task.metric.similar_below:
+            settled &= ~(task.source.half_tangent(parameter) < task.metric.similar_below)
         return Attempt(attempt.parameter, attempt.distance, settled)
 
 
-def _follow_knots(task: FitTask) -> Attempt:
+def _follow_knots(task: ConversionTask) -> Attempt:
     """Settle many values from the fits of a few between which they lie."""
     x = np.log(task.parameter)
     knots = np.exp(np.linspace(x.min(), x.max(), _KNOTS))
-    return FitCurve(task.source, knots, task.target, task.metric)(task.parameter)
+    return FitCurve(task._replace(parameter=knots))(task.parameter)
 
 
-def _search(task: FitTask) -> Attempt:
+def _search(task: ConversionTask) -> Attempt:
     """Settle every value, without knowing where its minimum is."""
     source, parameter, target, metric, _ = task
     best, distance = np.full((2, parameter.size), np.nan)
@@ -449,7 +447,7 @@ def _search(task: FitTask) -> Attempt:
         similar = scale < 1
         widened = source.from_half_tangent(metric.similar_below)
         task = task._replace(parameter=np.where(similar, widened, parameter))
-    for rows in _batches(np.arange(parameter.size), _ROWS_AT_ONCE):
+    for rows in batches(np.arange(parameter.size), _ROWS_AT_ONCE):
         best[rows], distance[rows] = _global_minimum(task.problem(rows))
     if metric.similar_below and similar.any():
         tangent = target.half_tangent(best[similar]) * scale[similar]
@@ -457,7 +455,7 @@ def _search(task: FitTask) -> Attempt:
     return Attempt(best, distance, np.ones(best.size, bool))
 
 
-def _follow_to_samples(task: FitTask) -> Attempt:
+def _follow_to_samples(task: ConversionTask) -> Attempt:
     """Settle fits on samples from those over the hemisphere by way of a few samples, or none."""
     nothing = Attempt.nothing(task.parameter.size)
     stored = StoredFit(task.source, task.target, task.metric)
@@ -489,12 +487,14 @@ class _CoarseSamples:
         return self.coarse(rows, fine=True)
 
 
-def _batches(rows: Indices, size: int) -> Iterator[Indices]:
+def batches(rows: Indices, size: int) -> Iterator[Indices]:
+    """Yield rows in parts of a size."""
     return (rows[start : start + size] for start in range(0, rows.size, size))
 
 
 # The searches in the order in which they are asked, each for what is not settled yet, and how many
 # values must be left for it to pay.
+_Searches: TypeAlias = Sequence[tuple[Callable[[ConversionTask], Attempt], int]]
 _SEARCHES = ((_interpolate, WORTH_IT), (follow_stored, 0), (_follow_knots, _KNOTS), (_search, 0))
 _SEARCHES_ON_SAMPLES = ((_follow_to_samples, 0), (_search, 0))
 
@@ -544,7 +544,7 @@ def fit(
         The global minimum of each problem.
     """
     searches = _SEARCHES if quadrature is None else _SEARCHES_ON_SAMPLES
-    return _solved(FitTask(source, parameter, target, metric, quadrature), searches)
+    return _solved(ConversionTask(source, parameter, target, metric, quadrature), searches)
 
 
 def cold_fit(
@@ -555,11 +555,11 @@ def cold_fit(
     quadrature: Quadrature | None = None,
 ) -> Fit:
     """Fit without knowing where the minimum is: as `fit`, which it checks."""
-    task = FitTask(source, parameter, target, metric, quadrature)
+    task = ConversionTask(source, parameter, target, metric, quadrature)
     return _solved(task, ((_search, 0),))
 
 
-def _solved(task: FitTask, searches: Sequence[tuple[Callable[[FitTask], Attempt], int]]) -> Fit:
+def _solved(task: ConversionTask, searches: _Searches) -> Fit:
     """Return the fits of a task, each from the first search that settles it."""
     best, distance = np.full((2, task.parameter.size), np.nan)
     left = np.arange(task.parameter.size)

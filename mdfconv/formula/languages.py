@@ -9,7 +9,6 @@ from __future__ import annotations
 import keyword
 import re
 import unicodedata
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -44,26 +43,12 @@ _WORDS = """
 _TAKEN = {*_WORDS.split(), *keyword.kwlist}
 
 
-class Language(ABC):
-    """A form in which a formula is written; `comment` starts a line that is not part of it."""
-
-    comment: str
-
-    @abstractmethod
-    def lines(self, formula: Formula, problem: SearchProblem) -> list[str]:
-        """Return the lines of a formula, without the comment before it."""
-
-    @abstractmethod
-    def one_line(self, formula: Formula, problem: SearchProblem) -> str:
-        """Return what the formula computes in a single line, for a table."""
-
-
 def _plain(value: float) -> str:
     return str(np.float32(value))
 
 
 @dataclass(frozen=True)
-class Syntax(Language):
+class Syntax:
     """How a programming language writes what the formulas need; without words of its own as GLSL.
 
     Parameters
@@ -112,7 +97,7 @@ class Syntax(Language):
         return [*declared, f"return {result}"]
 
 
-class Latex(Language):
+class Latex:
     """The formula as LaTeX."""
 
     comment = "%"
@@ -146,7 +131,7 @@ class Latex(Language):
         return f"{_latex_symbol(problem.target)} = {start}{value}"
 
 
-LANGUAGES: Registry[Language] = Registry("language")
+LANGUAGES: Registry[Syntax | Latex] = Registry("language")
 LANGUAGES.add("glsl", Syntax(inverse_root="inversesqrt({})"))
 LANGUAGES.add("hlsl", Syntax(inverse_root="rsqrt({})"))
 LANGUAGES.add(
@@ -292,22 +277,18 @@ def _enclosed(value: str) -> str:
 
 def _raised(base: str, exponent: float, dialect: Syntax, named: Callable[[str, str], str]) -> str:
     """Return the expression of a name raised to one of the family's powers."""
-    square = f"{base} * {base}"
     if exponent == 4:
-        square = named("w2", square)
+        square = named("w2", f"{base} * {base}")
         return f"{square} * {square}"
-    one = dialect.number(1.0)
-    root = _enclosed(dialect.root.format(base))
-    return {
-        1.0: base,
-        2.0: square,
-        -1.0: f"{one} / {base}",
-        -2.0: f"{one} / ({square})",
-        0.5: dialect.root.format(base),
-        -0.5: dialect.inverse_root.format(base),
-        0.25: dialect.root.format(root),
-        -0.25: dialect.inverse_root.format(root),
-    }[exponent]
+    if exponent == 2:
+        return f"{base} * {base}"
+    if exponent == 1:
+        return base
+    if abs(exponent) == 0.5:
+        return (dialect.root if exponent > 0 else dialect.inverse_root).format(base)
+    if abs(exponent) == 0.25:
+        return _raised(_enclosed(dialect.root.format(base)), 2 * exponent, dialect, named)
+    return f"{dialect.number(1.0)} / {_enclosed(_raised(base, -exponent, dialect, named))}"
 
 
 def _horner(coefficients: tuple[float, ...], u: str, dialect: Syntax) -> str:

@@ -42,15 +42,10 @@ def new_figure(width: float, height: float) -> Any:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    mpl.rcParams.update(
-        {
-            "font.size": 9,
-            "axes.grid": True,
-            "grid.color": "0.9",
-            "axes.axisbelow": True,
-            "legend.frameon": False,
-        }
-    )
+    mpl.rc("font", size=9)
+    mpl.rc("axes", grid=True, axisbelow=True)
+    mpl.rc("grid", color="0.9")
+    mpl.rc("legend", frameon=False)
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure

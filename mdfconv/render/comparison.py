@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,15 +19,8 @@ from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.metrics.base import srgb
 from mdfconv.output.records import rounded_rows
-from mdfconv.render.sphere import (
-    LIGHTS,
-    MARGIN,
-    Frame,
-    cross_section,
-    highlight,
-    highlight_extent,
-    radiance,
-)
+from mdfconv.render import sphere
+from mdfconv.render.sphere import MARGIN, Frame
 
 # Sawicki 2021, captions of Figures 1 and 2.
 PAPER_SETS: Mapping[str, Mapping[str, float]] = {
@@ -130,19 +123,11 @@ def default_rules(exposure: float) -> list[PictureRule]:
 
 
 @dataclass(frozen=True)
-class Rendering:
-    """The pictures of one surface, which is an endpoint and the stored value of its parameter.
-
-    Image and close-up, of the highlight alone, are linear light relative to the reference's peak,
-    in shape (size, size), or (3, size, size) in colour; the section is the luminance along the line
-    through the highlight.
-    """
+class _Surface:
+    """A distribution and its parameter, in the form that the user has and as it is."""
 
     end: Endpoint
     value: float
-    image: Array
-    closeup: Array
-    section: Array
 
     @property
     def name(self) -> str:
@@ -154,13 +139,32 @@ class Rendering:
         """The parameter behind its symbol."""
         return self.end.text(self.value)
 
+    @property
+    def lobe(self) -> tuple[Distribution, float]:
+        return self.end.distribution, self.end.decode_one(self.value)
+
+    def converted(self, end: Endpoint, rule: PictureRule) -> _Surface:
+        """Return the surface with another distribution."""
+        value = convert(self.value, self.end, end, rule.method, metric=rule.metric)
+        return _Surface(end, float(value))
+
+
+@dataclass(frozen=True)
+class Rendering(_Surface):
+    """The pictures of one surface.
+
+    Image and close-up, of the highlight alone, are linear light relative to the reference's peak,
+    in shape (size, size), or (3, size, size) in colour; the section is the luminance along the line
+    through the highlight.
+    """
+
+    image: Array
+    closeup: Array
+    section: Array
+
     def displayed(self, exposure: float) -> Array:
         """Return the picture as a screen shows it, encoded, in [0, 1]."""
         return srgb(exposure * self.image)
-
-    def displayed_closeup(self, exposure: float) -> Array:
-        """Return the highlight as a screen shows it."""
-        return srgb(exposure * self.closeup)
 
 
 @dataclass(frozen=True)
@@ -210,8 +214,7 @@ class PictureComparison:
         In colour it is the difference of the channel that differs most, so that 0 is equal.
         """
         exposure = self.scene.exposure
-        ours = self.reference.displayed_closeup(exposure)
-        difference = substitute.displayed_closeup(exposure) - ours
+        difference = srgb(exposure * substitute.closeup) - srgb(exposure * self.reference.closeup)
         if difference.ndim == 2:
             return difference
         largest = np.abs(difference).argmax(axis=0, keepdims=True)
@@ -229,23 +232,6 @@ def lobe_extent(distribution: Distribution, parameter: Array) -> Array:
     """Return the angle up to which the figures show a lobe: 4.8 β_half, at most π/2, radians."""
     extent = _HALF_WIDTHS * distribution.half_width(parameter)
     return np.where(extent <= np.pi / 2, extent, np.pi / 2)
-
-
-@dataclass(frozen=True)
-class _Surface:
-    """A distribution and its parameter, in the form that the user has and as it is."""
-
-    end: Endpoint
-    value: float
-
-    @property
-    def lobe(self) -> tuple[Distribution, float]:
-        return self.end.distribution, self.end.decode_one(self.value)
-
-    def converted(self, end: Endpoint, rule: PictureRule) -> _Surface:
-        """Return the surface with another distribution."""
-        value = convert(self.value, self.end, end, rule.method, metric=rule.metric)
-        return _Surface(end, float(value))
 
 
 def compare(
@@ -278,11 +264,12 @@ def compare(
     ends = [one_parameter_endpoint(target) for target in targets]
     rows = {rule.label: [reference.converted(end, rule) for end in ends] for rule in rules}
     mdf, parameter = reference.lobe
-    extent = highlight_extent(float(lobe_extent(mdf, np.asarray(parameter))), LIGHTS[scene.light])
+    extent = float(lobe_extent(mdf, np.asarray(parameter)))
+    extent = sphere.highlight_extent(extent, sphere.LIGHTS[scene.light])
     frame = _closeup_frame(extent, scene.size)
-    position, normals = cross_section(_SECTION_POINTS, min(extent, 1.0))
+    position, normals = sphere.cross_section(_SECTION_POINTS, min(extent, 1.0))
     surfaces = [reference, *(surface for row in rows.values() for surface in row)]
-    shown = _relative(_render(surfaces, scene, normals, frame), reference)
+    shown = _rendered(surfaces, scene, normals, frame)
     pictures = {label: [shown[surface] for surface in row] for label, row in rows.items()}
     return PictureComparison(scene, shown[reference], pictures, position, frame)
 
@@ -290,15 +277,17 @@ def compare(
 def _closeup_frame(extent: float, size: int) -> Frame:
     """Return what shows a highlight alone, or the sphere where that is no larger."""
     enlarged = int(MARGIN / np.sin(min(extent, 0.5 * np.pi)))
-    return Frame(size, highlight(), MARGIN / enlarged) if enlarged > 1 else Frame(size)
+    x, y, _ = sphere.HIGHLIGHT.tolist()
+    return Frame(size, (x, y), MARGIN / enlarged) if enlarged > 1 else Frame(size)
 
 
-def _render(
+def _rendered(
     surfaces: Sequence[_Surface], scene: Scene, normals: Array, closeup: Frame
 ) -> dict[_Surface, Rendering]:
-    """Return pictures and sections by surface, the reference first, not yet relative to a peak.
+    """Return the renderings by surface, relative to the peak of the first one, the reference.
 
-    All are drawn at once, as the directions are the same for all; and each lobe but once.
+    All are drawn at once, as the directions are the same for all; and each lobe but once. Raise
+    `MdfconvError` if the picture misses the peak.
     """
     lobes = {surface: surface.lobe for surface in surfaces}
     numbers = {lobe: number for number, lobe in enumerate(dict.fromkeys(lobes.values()))}
@@ -307,34 +296,14 @@ def _render(
     def side_by_side(toward: Array, view: Array) -> Array:
         return np.stack([brdf(toward, view) for brdf in brdfs])
 
-    mdf, parameter = lobes[surfaces[0]]
-    light = LIGHTS[scene.light].resolved(float(mdf.half_width(parameter)))
+    reference = surfaces[0]
+    mdf, parameter = reference.lobe
+    light = sphere.LIGHTS[scene.light].resolved(float(mdf.half_width(parameter)))
     whole = Frame(scene.size)
     images = whole.render(side_by_side, light)
     closeups = images if closeup == whole else closeup.render(side_by_side, light)
-    sections = radiance(normals, side_by_side, light)
-    return {
-        surface: Rendering(
-            surface.end,
-            surface.value,
-            *(pictures[numbers[lobe]] for pictures in (images, closeups, sections)),
-        )
-        for surface, lobe in lobes.items()
-    }
-
-
-def _relative(
-    rendered: Mapping[_Surface, Rendering], source: _Surface
-) -> dict[_Surface, Rendering]:
-    """Return renderings relative to the reference's peak, their sections as luminances.
-
-    Raises
-    ------
-    MdfconvError
-        If the picture misses the peak.
-    """
-    reference = rendered[source]
-    if reference.image.max() < _LEAST_PEAK * reference.section.max():
+    sections = sphere.radiance(normals, side_by_side, light)
+    if images[0].max() < _LEAST_PEAK * sections[0].max():
         raise MdfconvError(
             f"the highlight of {reference.name} {reference.value_text} "
             "falls between the pixels of the picture",
@@ -342,17 +311,16 @@ def _relative(
             argument="size",
         )
     # The pixel at the highlight need not hit the peak; the section's is as good a unit.
-    peak = max(reference.image.max(), reference.section.max())
-    pixels = reference.image.reshape(*reference.image.shape[:-2], -1)
-    brightest = max(_luminance(pixels).max(), _luminance(reference.section).max())
+    peak = max(images[0].max(), sections[0].max())
+    pixels = images[0].reshape(*images[0].shape[:-2], -1)
+    brightest = max(_luminance(pixels).max(), _luminance(sections[0]).max())
+    shown = [
+        (image / peak, enlarged / peak, _luminance(section) / brightest)
+        for image, enlarged, section in zip(images, closeups, sections, strict=True)
+    ]
     return {
-        surface: replace(
-            rendering,
-            image=rendering.image / peak,
-            closeup=rendering.closeup / peak,
-            section=_luminance(rendering.section) / brightest,
-        )
-        for surface, rendering in rendered.items()
+        surface: Rendering(surface.end, surface.value, *shown[numbers[lobe]])
+        for surface, lobe in lobes.items()
     }
 
 

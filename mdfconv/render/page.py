@@ -20,8 +20,7 @@ from mdfconv.brdf.microfacet import direction, half_vector
 from mdfconv.conversion import convert
 from mdfconv.conversion.explanation import remaining_error
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.dialects import Specular, dialects_of
-from mdfconv.distributions.endpoint import DEFAULT_ENCODING, Endpoint, encodings_of, endpoint
+from mdfconv.distributions.endpoint import Endpoint, stored_forms
 from mdfconv.distributions.evaluation import Array, gauss_panels
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
@@ -106,7 +105,7 @@ def page_data(source: Endpoint, target: Endpoint, start: float | None = None) ->
         "metrics": tables,
         "interpolation": float(f"{error:.2g}"),
         "encodings": _encodings(last, *span),
-        "lights": _lights(first),
+        "lights": [_light(name, LIGHTS[name], first) for name in LIGHTS.names],
         "environment": _environment(),
         "curves": _curves(),
         "margin": MARGIN,
@@ -260,8 +259,7 @@ def _encodings(mdf: Distribution, low: float, high: float) -> dict[str, Any]:
     Their ``values`` are those at ``nodes``, ln p, between which they are interpolated linearly, and
     NaN where the parameter cannot be stored.
     """
-    plain = Endpoint(mdf)
-    ends = [plain, *(endpoint(name) for name in _encoded_names(mdf))]
+    ends = [Endpoint(mdf), *(end for end, _ in stored_forms(mdf))]
     encoded = [end for end in ends if end.encoding]
     limits = [clamp.limit for end in ends if end.encoding for clamp in end.encoding.clamps]
     beside = [limit * (1 + side) for limit in limits for side in (-_BESIDE_CLAMP, 0, _BESIDE_CLAMP)]
@@ -287,22 +285,6 @@ def _encodings(mdf: Distribution, low: float, high: float) -> dict[str, Any]:
             for end in ends
         ],
     }
-
-
-def _encoded_names(mdf: Distribution) -> list[str]:
-    """Return the encodings as users write them; a needed specular weight is 1."""
-    dialects = dialects_of(mdf.name)
-    return [
-        f"{mdf.name}:{name}"
-        + (":1" if name in dialects and dialects[name].specular is Specular.needed else "")
-        for name in encodings_of(mdf)
-        if name != DEFAULT_ENCODING
-    ]
-
-
-def _lights(source: Distribution) -> list[dict[str, Any]]:
-    """Return the lights of `mdfconv.render.sphere`, and how bright they make the source."""
-    return [_light(name, LIGHTS[name], source) for name in LIGHTS.names]
 
 
 def _light(name: str, light: Lights, source: Distribution) -> dict[str, Any]:
@@ -404,21 +386,18 @@ def _curves() -> list[dict[str, Any]]:
     which the levels from 1 to 255 start.
     """
     root = np.linspace(0, 1, _CURVE_ENTRIES)
+    filmic = _filmic(_FILMIC_WHITE * np.square(root))
+    curves = ("sRGB", 1.0, np.square(root)), ("filmic", _FILMIC_WHITE, filmic)
+    levels = np.arange(1, 256)
     return [
-        _curve("sRGB", 1.0, srgb(np.square(root))),
-        _curve("filmic", _FILMIC_WHITE, srgb(_filmic(_FILMIC_WHITE * np.square(root)))),
+        {
+            "label": label,
+            "white": white,
+            "entries": _CURVE_ENTRIES,
+            "starts": _packed(np.searchsorted(np.rint(255 * srgb(shown)), levels), np.uint16),
+        }
+        for label, white, shown in curves
     ]
-
-
-def _curve(label: str, white: float, encoded: Array) -> dict[str, Any]:
-    levels = np.rint(255 * encoded)
-    starts = np.searchsorted(levels, np.arange(1, 256))
-    return {
-        "label": label,
-        "white": white,
-        "entries": _CURVE_ENTRIES,
-        "starts": _packed(starts, np.uint16),
-    }
 
 
 def _filmic(light: Array) -> Array:

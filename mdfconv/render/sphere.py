@@ -18,6 +18,8 @@ from mdfconv.registry import Registry
 
 VIEW = np.array([0.0, 0.0, 1.0])
 LIGHT = np.array([-0.5, 0.5, np.sqrt(0.5)])  # 45° off the viewer, from above left
+# The normal where the highlight lies.
+HIGHLIGHT = half_vector(LIGHT, VIEW)
 _AREA_HALF_SIDE = 0.15  # of the distance to the square light
 _AREA_SAMPLES = 8  # a side
 # Pairs of Gauss's nodes a side for each unit of half the range of t.
@@ -73,13 +75,6 @@ class _Square(Lights):
         return self
 
 
-def _square() -> Lights:
-    """Return the square; total irradiance π."""
-    steps = _AREA_HALF_SIDE * (2 * (np.arange(_AREA_SAMPLES) + 0.5) / _AREA_SAMPLES - 1)
-    directions, weight = _on_square(np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2))
-    return _Square(directions, np.pi * weight / weight.sum())
-
-
 @dataclass(frozen=True)
 class _GradedSquare(Lights):
     """The square, in samples that crowd around what a mirror would show at each normal.
@@ -113,7 +108,9 @@ class _GradedSquare(Lights):
 
 LIGHTS: Registry[Lights] = Registry("light")
 LIGHTS.add("directional", Lights(LIGHT[None, :], np.array([np.pi])))
-LIGHTS.add("area", _square())
+_steps = _AREA_HALF_SIDE * (2 * (np.arange(_AREA_SAMPLES) + 0.5) / _AREA_SAMPLES - 1)
+_toward, _weight = _on_square(np.stack(np.meshgrid(_steps, _steps), axis=-1).reshape(-1, 2))
+LIGHTS.add("area", _Square(_toward, np.pi * _weight / _weight.sum()))
 
 
 def radiance(normals: Array, brdf: Brdf, light: Lights) -> Array:
@@ -187,7 +184,7 @@ def cross_section(count: int, width: float) -> tuple[Array, Array]:
     The line runs through the centre of the sphere's disc, towards the light. So many positions are
     all along it, so many within the width, radians, around the highlight's centre.
     """
-    centre = float(np.arccos(half_vector(LIGHT, VIEW)[2]))
+    centre = float(np.arccos(HIGHLIGHT[2]))
     spread = centre + np.linspace(-width, width, count)
     everywhere = np.linspace(-0.5 * np.pi, 0.5 * np.pi, count + 2)[1:-1]
     angle = np.unique(np.concatenate([everywhere, spread, [centre]]))
@@ -197,14 +194,8 @@ def cross_section(count: int, width: float) -> tuple[Array, Array]:
     return np.sin(angle), normals
 
 
-def highlight() -> tuple[float, float]:
-    """Return where the highlight lies: the half vector's x and y, in radii."""
-    x, y, _ = half_vector(LIGHT, VIEW)
-    return float(x), float(y)
-
-
 def highlight_extent(lobe: float, light: Lights) -> float:
     """Return how far the highlight reaches, radians, for the angle up to which a lobe does."""
     halves = half_vector(light.directions, VIEW)
-    cosine = np.clip(halves @ half_vector(LIGHT, VIEW), -1, 1)
+    cosine = np.clip(halves @ HIGHLIGHT, -1, 1)
     return lobe + float(np.arccos(cosine).max())

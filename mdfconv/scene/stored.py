@@ -191,7 +191,7 @@ class StoredConverter:
     def _parameters(self, parameter: Array) -> Array:
         """Return what the method makes of legal parameters."""
         with np.errstate(all="ignore"):
-            return self.rule.solver.solve(parameter, *self._pair, self.metric).parameter
+            return self.rule.solver.solve(self.rule.task(parameter)).parameter
 
     def _storable(self, result: Array) -> Mask:
         with np.errstate(invalid="ignore"):

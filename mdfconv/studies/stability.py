@@ -25,6 +25,7 @@ from mdfconv.distributions.endpoint import Endpoint, exact_route
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvWarning
 from mdfconv.fitting.metrics import metric_named
+from mdfconv.fitting.problem import ConversionTask
 from mdfconv.output.records import csv_text
 from mdfconv.studies.pages import PageFiles, fill, pivot, read_rows
 
@@ -338,7 +339,7 @@ def printed_conversion(
     with np.errstate(all="ignore"):
         if isinstance(method, FormulaMethod):
             # It holds the formulas as printed.
-            result = method.convert(values, source, target, metric_named("unit"))
+            result = method.convert(ConversionTask(source, values, target, metric_named("unit")))
         else:
             first, last = (
                 getattr(end.printed, name)

@@ -22,7 +22,7 @@ from mdfconv.errors import MdfconvError
 from mdfconv.fitting.free_gamma import FreeFit, fit_free_gamma
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.metrics.base import Unit
-from mdfconv.fitting.problem import FitProblem
+from mdfconv.fitting.problem import ConversionTask
 from mdfconv.fitting.quadrature import UniformSamples
 from mdfconv.fitting.solve import fit
 from mdfconv.studies.pages import read_rows
@@ -120,7 +120,8 @@ def _columns(m_b: Array, limit: Array, metric: Metric, *, extended: bool) -> dic
         rmse_eq11, _ = remaining_error(*by_eq11, n_eq11, metric)
     else:
         rows = np.arange(m_b.size)
-        distance, _ = FitProblem(*by_eq11, metric, samples, rows).distance(np.log(n_eq11), rows)
+        task = ConversionTask(*by_eq11, metric, samples)
+        distance, _ = task.problem(rows).distance(np.log(n_eq11), rows)
         rmse_eq11 = np.sqrt(distance / SAMPLES)
     columns = {"m_b": m_b, "n_eq11": n_eq11, "rmse_n_eq11": rmse_eq11}
     targets = {column: distribution(name) for column, name in FITTED.items()}

@@ -7,9 +7,10 @@ import pytest
 from scipy.optimize import brentq
 
 import mdfconv
-from mdfconv.fitting import fit, metric_named, metrics, register_metric
+from mdfconv.fitting import metrics
+from mdfconv.fitting.metrics import metric_named, register_metric
 from mdfconv.fitting.metrics.base import Display, Energy, Environment, Unit
-from mdfconv.fitting.solve import cold_fit
+from mdfconv.fitting.solve import cold_fit, fit
 from tests.fitting import brute_force
 from tests.fitting.test_fit import NAMES, candidates
 

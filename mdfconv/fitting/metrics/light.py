@@ -15,6 +15,8 @@ from mdfconv.fitting.metrics.base import Metric
 from mdfconv.fitting.quadrature import NO_BREAKS, Breaks, Quadrature, Samples
 from mdfconv.light.spectrum import LobeSpectrum, Spectrum, spectrum_of_file
 
+_lobe_spectrum = cache(LobeSpectrum)
+
 
 class LightMetric(Metric):
     """The light of an environment map: Σ (2l+1) C_l (Δk_l)².
@@ -99,11 +101,6 @@ class _Degrees:
 def _spectrum(path: Path, changed: int) -> Spectrum:
     """Return the spectrum of a map; one that has changed since is read anew."""
     return spectrum_of_file(path)
-
-
-@cache
-def _lobe_spectrum(highest: int) -> LobeSpectrum:
-    return LobeSpectrum(highest)
 
 
 METRICS = (LightMetric,)

@@ -182,14 +182,10 @@ def fitted_distributions(
     chosen = named or one_parameter_distributions()
     if gamma is None:
         return chosen
-    second = [mdf for mdf in chosen if mdf.second_parameter]
+    second = {mdf: mdf.second_parameter for mdf in chosen if mdf.second_parameter}
     if not second:
         raise MdfconvError(f"{chosen[0].name} has one parameter and no γ")
-    illegal = [
-        mdf
-        for mdf in second
-        if mdf.second_parameter and not mdf.second_parameter.accepts(np.asarray(gamma))
-    ]
+    illegal = [mdf for mdf, range_ in second.items() if not range_.accepts(np.asarray(gamma))]
     if illegal and (named or len(illegal) == len(second)):
         illegal[0].with_gamma(gamma)  # says what is legal
     return [mdf for mdf in chosen if mdf not in illegal]

@@ -31,9 +31,9 @@ _CHIEF = ("file", "channel", "distribution", "parameter", "gamma", "rmse", "simp
 _SECOND = ("stderr", "error", "reflectance", "diffuse", "specular", "masking")
 
 
-def _column_option(name: str, what: str, otherwise: str = "") -> Any:
+def _column_option(what: str, otherwise: str = "") -> Any:
     help_ = f"Column of {what}, by name or number from 1{otherwise}."
-    return typer.Option(name, metavar="COLUMN", help=help_)
+    return typer.Option(metavar="COLUMN", help=help_)
 
 
 def command(
@@ -58,9 +58,7 @@ def command(
         Literal["ndf", "brdf"] | None,
         typer.Option(help="ndf (default for text), or brdf at θ_d ≈ 0 (default for MERL, ALTA)."),
     ] = None,
-    angle: Annotated[
-        str | None, _column_option("--angle", "angles", "; by default from the names")
-    ] = None,
+    angle: Annotated[str | None, _column_option("angles", "; by default from the names")] = None,
     angle_is: Annotated[
         Literal["half", "reflected", "incident"] | None,
         typer.Option(
@@ -68,10 +66,10 @@ def command(
             "or incident direction, the other along the normal."
         ),
     ] = None,
-    theta_i: Annotated[str | None, _column_option("--theta-i", "the incident zenith")] = None,
-    phi_i: Annotated[str | None, _column_option("--phi-i", "the incident azimuth")] = None,
-    theta_o: Annotated[str | None, _column_option("--theta-o", "the outgoing zenith")] = None,
-    phi_o: Annotated[str | None, _column_option("--phi-o", "the outgoing azimuth")] = None,
+    theta_i: Annotated[str | None, _column_option("the incident zenith")] = None,
+    phi_i: Annotated[str | None, _column_option("the incident azimuth")] = None,
+    theta_o: Annotated[str | None, _column_option("the outgoing zenith")] = None,
+    phi_o: Annotated[str | None, _column_option("the outgoing azimuth")] = None,
     angle_unit: Annotated[
         str | None,
         typer.Option(
@@ -81,8 +79,7 @@ def command(
         ),
     ] = None,
     values: Annotated[
-        list[str] | None,
-        typer.Option("--values", metavar="COLUMN", help="Column of values; repeatable."),
+        list[str] | None, typer.Option(metavar="COLUMN", help="Column of values; repeatable.")
     ] = None,
     cells: Annotated[
         int | None,
@@ -142,9 +139,7 @@ def command(
     report: Annotated[
         Path | None,
         typer.Option(
-            "--report",
-            metavar="FILE",
-            help="Write a page for a colleague: .html, or .md with its pictures.",
+            metavar="FILE", help="Write a page for a colleague: .html, or .md with its pictures."
         ),
     ] = None,
     force: options.ForceOption = False,
@@ -303,9 +298,8 @@ def _ends(names: Sequence[str]) -> list[Endpoint]:
 
     if ALL in [name.strip().lower() for name in names]:
         return []
-    return list(
-        {end.label: end for end in (options.noted(endpoint(name)) for name in names)}.values()
-    )
+    ends = (options.noted(endpoint(name)) for name in names)
+    return list({end.label: end for end in ends}.values())
 
 
 def _targets(ends: Sequence[Endpoint], gamma: float | None) -> list[Distribution]:

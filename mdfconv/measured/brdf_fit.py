@@ -21,7 +21,8 @@ from scipy.optimize import least_squares
 
 from mdfconv.brdf.fresnel import dielectric, schlick_fresnel
 from mdfconv.brdf.microfacet import dot, polar_angle, v_cavity
-from mdfconv.distributions import Distribution, distribution
+from mdfconv.distributions import Distribution
+from mdfconv.distributions.endpoint import follow, to_root
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
@@ -38,8 +39,7 @@ Fresnel: TypeAlias = Callable[[Array], Array | float] | None
 
 # F₀ of a dielectric and of a dark metal, between which a search finds its way.
 _STARTING_F0 = (0.04, 0.5)
-_LEAST_F0 = 1e-4
-_MOST_F0 = 1 - 1e-4
+_F0_RANGE = (1e-4, 1 - 1e-4)
 # Of a directional fit's differences, in a logarithm or in F₀.
 _DIFFERENCE = 1e-5
 # Of a central difference: truncation falls with h², rounding rises with ε/h.
@@ -330,7 +330,7 @@ class _Lobe(ABC):
         if self.gamma_range:
             ends.append(tuple(np.log(self.gamma_range)))
         if self.has_free_reflectance:
-            ends.append((_LEAST_F0, _MOST_F0))
+            ends.append(_F0_RANGE)
         return np.array(ends).T
 
     def distribution(self, point: Array) -> Distribution:
@@ -500,12 +500,8 @@ def foreshortening(beta: Array, quantity: str) -> Array:
 
 def _smith_form(mdf: Distribution, parameter: Array) -> tuple[Distribution, Array] | None:
     """Return the distribution of the same lobe whose Λ is known, and its α; None for none."""
-    while not mdf.smith:
-        equal = mdf.equivalent
-        if equal is None or not equal.same_lobe:
-            return None
-        mdf, parameter = distribution(equal.name), equal.forward(parameter)
-    return mdf, parameter
+    root, steps = to_root(mdf, same_lobe=True)
+    return (root, follow(steps, parameter)) if root.smith else None
 
 
 def _half_width_logarithms(target: Distribution, tangents: Array) -> Array:

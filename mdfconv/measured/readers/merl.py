@@ -94,13 +94,10 @@ def _planes(source: Source) -> Array:
     return numbers.reshape(3, half, difference, azimuth)
 
 
-def _dimensions(head: bytes) -> tuple[int, int, int] | None:
-    if len(head) < _HEADER_BYTES:
-        return None
-    first, second, third = (int(count) for count in np.frombuffer(head, "<i4", 3))
-    if min(first, second, third) < 1 or max(first, second, third) > _LARGEST_DIMENSION:
-        return None
-    return first, second, third
+def _dimensions(head: bytes) -> list[int] | None:
+    """Return how many θ_h, θ_d and φ_d a header says there are; None if it is none."""
+    counts = np.frombuffer(head, "<i4", 3).tolist() if len(head) >= _HEADER_BYTES else [0]
+    return counts if min(counts) >= 1 and max(counts) <= _LARGEST_DIMENSION else None
 
 
 def _recognizes(name: str, head: bytes) -> bool:

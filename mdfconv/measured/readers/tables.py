@@ -231,8 +231,7 @@ def parse_table(path: Path, lines: Iterable[str]) -> Table:
     """
     rows, comments = [], []
     for place, line in enumerate(lines, start=1):
-        mark = _COMMENT.match(line)
-        if mark:
+        if mark := _COMMENT.match(line):
             comments.append(line[mark.end() :].strip())
         elif line.strip():
             rows.append((place, line.strip()))
@@ -250,8 +249,7 @@ def parse_table(path: Path, lines: Iterable[str]) -> Table:
 
 def _form_of(lines: Sequence[str]) -> TableForm:
     """Return the form under which the most lines are numbers, more than one a line if any is."""
-    rows = [[form.numbers(line) for line in lines] for form in _FORMS]
-    wide = [sum(row is not None and len(row) > 1 for row in read) for read in rows]
+    wide = [sum(len(form.numbers(line) or ()) > 1 for line in lines) for form in _FORMS]
     if max(wide):
         return _FORMS[wide.index(max(wide))]
     first = lines[0] if lines else ""

@@ -52,11 +52,9 @@ def read_table(table: Table, options: ReadOptions) -> Measurements:
     if meaning not in (None, *_MEANINGS):
         raise unknown_name("angle", meaning, list(_MEANINGS))
     columns = _Columns(table, options)
-    if options.angle is None and meaning is None:
-        directions = columns.directions()
-        if directions is not None:
-            return directions
-    return columns.one_angle()
+    is_of_one = options.angle is not None or meaning is not None
+    directions = None if is_of_one else columns.directions()
+    return directions or columns.one_angle()
 
 
 class _Columns:

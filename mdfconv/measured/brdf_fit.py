@@ -621,9 +621,7 @@ class _Problem:
             raise MdfconvError(*self.lobe.refusal)
         searched = self.lobe.names
         names = [*searched, *list(self.lobe.linear) * scale.size]
-        matrix, undetermined = self._decomposed(
-            projection.jacobian(lobe, slopes, gain, scale), names
-        )
+        matrix, undetermined = self._factored(projection.jacobian(lobe, slopes, gain, scale), names)
         count, unknowns = residual.size, len(names)
         cost = float(np.sum(np.square(residual)))
         spread = np.sqrt(cost / (count - unknowns)) * projection.standard_deviations(matrix)
@@ -665,9 +663,7 @@ class _Problem:
         is_near = np.minimum(point - low, high - point) < _AT_END
         return tuple(compress(self.lobe.names[first:], is_near[first:]))
 
-    def _decomposed(
-        self, blocks: Iterator[Array], names: list[str]
-    ) -> tuple[Array, tuple[str, ...]]:
+    def _factored(self, blocks: Iterator[Array], names: list[str]) -> tuple[Array, tuple[str, ...]]:
         """Return J, or its R, and the names of what the data do not tell apart."""
         if isinstance(self.lobe, _SliceLobe):
             whole = np.concatenate(list(blocks))

@@ -67,11 +67,8 @@ class _Columns:
         self._table, self._options = table, options
         self._notes = list(table.notes)
         self._names = dict(enumerate(table.names)) if table.is_named else {}
-        self._counting = [
-            index
-            for index, name in self._names.items()
-            if tables.counts_rows(name, table.numbers[:, index])
-        ]
+        named = ((index, name, table.numbers[:, index]) for index, name in self._names.items())
+        self._counting = [index for index, name, rows in named if tables.counts_rows(name, rows)]
 
     def directions(self) -> DirectionalSamples | None:
         """Return samples of two directions; None if the table has no zenith of both."""
@@ -213,10 +210,8 @@ class _Columns:
                 f"{'one column is' if len(table.names) == 1 else 'the columns are'} not enough",
                 "it takes an angle and a value",
             )
-        notes = [
-            f"column '{table.names[index]}' counts the rows and is passed over"
-            for index in counting
-        ]
+        remark = "counts the rows and is passed over"
+        notes = [f"column '{table.names[index]}' {remark}" for index in counting]
         others = [index for index in rest if index not in chosen]
         if others:
             notes.append(

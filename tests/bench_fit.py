@@ -17,7 +17,7 @@ from mdfconv.fitting.metrics.base import Unit
 from mdfconv.fitting.quadrature import UniformSamples
 from mdfconv.fitting.solve import fit
 from mdfconv.measured.brdf_fit import fit_distribution
-from mdfconv.measured.readers.merl import read_merl
+from mdfconv.measured.readers import read
 from mdfconv.studies.table2 import FITTED, SAMPLES, paper_sweep
 
 REPEATS = 15
@@ -54,7 +54,7 @@ def merl(path):
 
 def read_and_fit(path):
     """Read the file and fit every distribution."""
-    data = read_merl(path)
+    data = read(path)
     return [fit_distribution(data, entry) for entry in mdfconv.list_distributions()]
 
 

@@ -13,20 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from mdfconv.cli import completion
-from mdfconv.cli.options import (
-    ForceOption,
-    Format,
-    FormatOption,
-    OutputOption,
-    PngOption,
-    chosen_gamma,
-    in_asked_forms,
-    noted,
-)
+from mdfconv.cli import completion, options, tables
+from mdfconv.cli.options import Format
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.process import tell
-from mdfconv.cli.tables import form_of, progress, write_table
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import cell_text
 from mdfconv.registry import ALL
@@ -41,9 +31,9 @@ _CHIEF = ("file", "channel", "distribution", "parameter", "gamma", "rmse", "simp
 _SECOND = ("stderr", "error", "reflectance", "diffuse", "specular", "masking")
 
 
-def _column_option(name: str, what: str, otherwise: str = "") -> Any:
+def _column_option(what: str, otherwise: str = "") -> Any:
     help_ = f"Column of {what}, by name or number from 1{otherwise}."
-    return typer.Option(name, metavar="COLUMN", help=help_)
+    return typer.Option(metavar="COLUMN", help=help_)
 
 
 def command(
@@ -68,9 +58,7 @@ def command(
         Literal["ndf", "brdf"] | None,
         typer.Option(help="ndf (default for text), or brdf at θ_d ≈ 0 (default for MERL, ALTA)."),
     ] = None,
-    angle: Annotated[
-        str | None, _column_option("--angle", "angles", "; by default from the names")
-    ] = None,
+    angle: Annotated[str | None, _column_option("angles", "; by default from the names")] = None,
     angle_is: Annotated[
         Literal["half", "reflected", "incident"] | None,
         typer.Option(
@@ -78,10 +66,10 @@ def command(
             "or incident direction, the other along the normal."
         ),
     ] = None,
-    theta_i: Annotated[str | None, _column_option("--theta-i", "the incident zenith")] = None,
-    phi_i: Annotated[str | None, _column_option("--phi-i", "the incident azimuth")] = None,
-    theta_o: Annotated[str | None, _column_option("--theta-o", "the outgoing zenith")] = None,
-    phi_o: Annotated[str | None, _column_option("--phi-o", "the outgoing azimuth")] = None,
+    theta_i: Annotated[str | None, _column_option("the incident zenith")] = None,
+    phi_i: Annotated[str | None, _column_option("the incident azimuth")] = None,
+    theta_o: Annotated[str | None, _column_option("the outgoing zenith")] = None,
+    phi_o: Annotated[str | None, _column_option("the outgoing azimuth")] = None,
     angle_unit: Annotated[
         str | None,
         typer.Option(
@@ -91,8 +79,7 @@ def command(
         ),
     ] = None,
     values: Annotated[
-        list[str] | None,
-        typer.Option("--values", metavar="COLUMN", help="Column of values; repeatable."),
+        list[str] | None, typer.Option(metavar="COLUMN", help="Column of values; repeatable.")
     ] = None,
     cells: Annotated[
         int | None,
@@ -144,21 +131,18 @@ def command(
         ),
     ] = None,
     tolerance: Annotated[
-        float,
-        typer.Option(metavar="T", help="How much worse than the best the simplest may be."),
+        float, typer.Option(metavar="T", help="How much worse than the best the simplest may be.")
     ] = 0.05,
-    format_: FormatOption = None,
-    output: OutputOption = None,
-    png: PngOption = None,
+    format_: options.FormatOption = None,
+    output: options.OutputOption = None,
+    png: options.PngOption = None,
     report: Annotated[
         Path | None,
         typer.Option(
-            "--report",
-            metavar="FILE",
-            help="Write a page for a colleague: .html, or .md with its pictures.",
+            metavar="FILE", help="Write a page for a colleague: .html, or .md with its pictures."
         ),
     ] = None,
-    force: ForceOption = False,
+    force: options.ForceOption = False,
 ) -> None:
     """Fit distributions to measured reflectance or to a measured distribution of normals.
 
@@ -192,9 +176,9 @@ def command(
 
         check_report_name(report)
     ends = _ends(targets or [])
-    fixed = chosen_gamma(gamma)
+    fixed = options.chosen_gamma(gamma)
     shape = fixed if isinstance(fixed, float) else None
-    options = {
+    settings = {
         "targets": _targets(ends, shape),
         "gamma": shape,
         **vars(BrdfModel(loss, masking or "smith", fresnel or "none", robust)),
@@ -207,7 +191,7 @@ def command(
         angle, theta_i, phi_i, theta_o, phi_o, tuple(values or ()), angle_unit, angle_is, cells
     )
     needs_two = bool(masking or fresnel or robust or loss == "cosine")
-    work = partial(_analysis, columns=columns, options=options, needs_two=needs_two)
+    work = partial(_analysis, columns=columns, settings=settings, needs_two=needs_two)
     analyses = [work(files[0])] if len(files) == 1 else _in_processes(work, files)
     names, rows = _table(analyses, ends, separate=separate)
     contents: dict[Path, bytes] = {}
@@ -221,20 +205,22 @@ def command(
 
         line = join(["mdfconv", *sys.argv[1:]])
         texts = _shown(rows, "markdown")
-        contents |= report_files(analyses[0], texts, line, report, logarithms=logarithms)
+        contents |= report_files(
+            analyses[0], texts, line, report, chief=_CHIEF + _SECOND, logarithms=logarithms
+        )
     title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
     ranked = "log_rmse" if logarithms and "log_rmse" in names else "rmse"
     minor = [*_SECOND, *(name for name in names if name not in _CHIEF + _SECOND), "rmse"]
     minor.remove(ranked)
-    form = form_of(format_, output)
+    form = tables.form_of(format_, output)
     shown = _shown(rows, form)
-    write_table(names, shown, form, outputs, beside=contents, title=title, secondary=minor)
+    tables.write_table(names, shown, form, outputs, beside=contents, title=title, secondary=minor)
     for analysis in analyses:
         _tell(analysis, tolerance, named=len(analyses) > 1)
 
 
 def _analysis(
-    path: Path, columns: ReadOptions, options: dict[str, Any], *, needs_two: bool
+    path: Path, columns: ReadOptions, settings: dict[str, Any], *, needs_two: bool
 ) -> Analysis:
     """Return the fits to a file."""
     from mdfconv.measured import Samples, fit, read
@@ -245,14 +231,14 @@ def _analysis(
             f"{path}: --masking, --fresnel, --robust and --loss cosine need two directions",
             "this file has one angle",
         )
-    return fit(samples, name=path.name, **options)
+    return fit(samples, name=path.name, **settings)
 
 
 def _in_processes(work: Callable[[Path], Analysis], files: Sequence[Path]) -> list[Analysis]:
     """Return the fits to several files, with a bar on a terminal."""
     analyses = []
     with (
-        progress("Files", len(files)) as advance,
+        tables.progress("Files", len(files)) as advance,
         ProcessPoolExecutor(min(len(files), os.cpu_count() or 1)) as pool,
     ):
         for analysis in pool.map(work, files):
@@ -270,7 +256,7 @@ def _table(
         file = {"file": analysis.name} if len(analyses) > 1 else {}
         for result in analysis.results:
             channel = {"channel": result.samples.channels[0]} if separate else {}
-            records = in_asked_forms(result.records(), ends)
+            records = options.in_asked_forms(result.records(), ends)
             rows += [file | channel | record for record in records]
     names = list(dict.fromkeys(name for row in rows for name in row))
     return names, [{name: row.get(name) for name in names} for row in rows]
@@ -312,7 +298,8 @@ def _ends(names: Sequence[str]) -> list[Endpoint]:
 
     if ALL in [name.strip().lower() for name in names]:
         return []
-    return list({end.label: end for end in (noted(endpoint(name)) for name in names)}.values())
+    ends = (options.noted(endpoint(name)) for name in names)
+    return list({end.label: end for end in ends}.values())
 
 
 def _targets(ends: Sequence[Endpoint], gamma: float | None) -> list[Distribution]:

@@ -11,7 +11,7 @@ import numpy as np
 from mdfconv.distributions import Distribution, distribution, one_parameter_distributions
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.brdf_fit import BrdfModel, MeasuredFit, fit_distribution
-from mdfconv.measured.samples import DirectionalSamples, Measurements
+from mdfconv.measured.samples import DirectionalSamples, Measurements, note_of
 
 # Beyond it the masking that a slice at θ_d = 0 leaves out is large, degrees.
 _BRDF_LIMIT = 80.0
@@ -182,14 +182,10 @@ def fitted_distributions(
     chosen = named or one_parameter_distributions()
     if gamma is None:
         return chosen
-    second = [mdf for mdf in chosen if mdf.second_parameter]
+    second = {mdf: mdf.second_parameter for mdf in chosen if mdf.second_parameter}
     if not second:
         raise MdfconvError(f"{chosen[0].name} has one parameter and no γ")
-    illegal = [
-        mdf
-        for mdf in second
-        if mdf.second_parameter and not mdf.second_parameter.accepts(np.asarray(gamma))
-    ]
+    illegal = [mdf for mdf, range_ in second.items() if not range_.accepts(np.asarray(gamma))]
     if illegal and (named or len(illegal) == len(second)):
         illegal[0].with_gamma(gamma)  # says what is legal
     return [mdf for mdf in chosen if mdf not in illegal]
@@ -213,9 +209,7 @@ def _restricted(
             notes = (*notes, "brdf: the lobe is D̄/cos²β at θ_d = 0; masking is left out")
     if not keep.any():
         raise MdfconvError(f"{name}: no samples up to {limit:g}°")
-    if not keep.all():
-        count = int(np.count_nonzero(~keep))
-        notes = (*notes, f"{count} of {keep.size} samples beyond {limit:g}° are left out")
+    notes += note_of(~keep, f"samples beyond {limit:g}° are left out")
     return replace(samples.select(keep), notes=notes)
 
 

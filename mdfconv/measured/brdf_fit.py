@@ -21,18 +21,12 @@ from scipy.optimize import least_squares
 
 from mdfconv.brdf.fresnel import dielectric, schlick_fresnel
 from mdfconv.brdf.microfacet import dot, polar_angle, v_cavity
-from mdfconv.distributions import Distribution, distribution
+from mdfconv.distributions import Distribution
+from mdfconv.distributions.endpoint import follow, to_root
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.projection import (
-    Projection,
-    jacobian,
-    model,
-    projected_slope,
-    standard_deviations,
-    upper_triangle,
-)
+from mdfconv.measured import projection
 from mdfconv.measured.samples import DirectionalSamples, Measurements, Samples
 from mdfconv.registry import unknown_name
 
@@ -45,8 +39,7 @@ Fresnel: TypeAlias = Callable[[Array], Array | float] | None
 
 # F₀ of a dielectric and of a dark metal, between which a search finds its way.
 _STARTING_F0 = (0.04, 0.5)
-_LEAST_F0 = 1e-4
-_MOST_F0 = 1 - 1e-4
+_F0_RANGE = (1e-4, 1 - 1e-4)
 # Of a directional fit's differences, in a logarithm or in F₀.
 _DIFFERENCE = 1e-5
 # Of a central difference: truncation falls with h², rounding rises with ε/h.
@@ -193,7 +186,7 @@ class MeasuredFit:
         parameter = np.array([[self.parameter]])
         value = lobe.value(self.distribution, parameter, self.parameters.get("reflectance"))
         linear = (np.array(self.linear[name]) / unit for name, unit in lobe.linear.items())
-        return model(value[0], *linear)
+        return projection.model(value[0], *linear)
 
     def record(self) -> dict[str, Any]:
         """Return the fit as a row of a table."""
@@ -337,7 +330,7 @@ class _Lobe(ABC):
         if self.gamma_range:
             ends.append(tuple(np.log(self.gamma_range)))
         if self.has_free_reflectance:
-            ends.append((_LEAST_F0, _MOST_F0))
+            ends.append(_F0_RANGE)
         return np.array(ends).T
 
     def distribution(self, point: Array) -> Distribution:
@@ -355,8 +348,7 @@ class _Lobe(ABC):
 
     def at(self, point: Array) -> Array:
         """Return the lobe of a point, shape (n,)."""
-        lobe: Array = self.at_points(point[None, :])[0]
-        return lobe
+        return np.asarray(self.at_points(point[None, :])[0])
 
     @abstractmethod
     def value(self, mdf: Distribution, parameter: Array, reflectance: float | None) -> Array:
@@ -468,11 +460,9 @@ class _DirectionalLobe(_Lobe):
         return value * schlick_fresnel(self._difference_cosine, reflectance)
 
     def _masked(self, mdf: Distribution, parameter: Array) -> Array | float:
-        if self.masking == "none":
-            return 1.0
-        form = _smith_form(mdf, parameter)
-        if self.masking == "v-cavity" or form is None:
-            return self._v_cavity
+        form = _smith_form(mdf, parameter) if self.masking == "smith" else None
+        if form is None:
+            return 1.0 if self.masking == "none" else self._v_cavity
         smith, alpha = form
         incident, outgoing = (smith.smith_lambda(alpha * tangent) for tangent in self._tangents)
         return 1 / (1 + incident + outgoing)
@@ -510,12 +500,8 @@ def foreshortening(beta: Array, quantity: str) -> Array:
 
 def _smith_form(mdf: Distribution, parameter: Array) -> tuple[Distribution, Array] | None:
     """Return the distribution of the same lobe whose Λ is known, and its α; None for none."""
-    while not mdf.smith:
-        equal = mdf.equivalent
-        if equal is None or not equal.same_lobe:
-            return None
-        mdf, parameter = distribution(equal.name), equal.forward(parameter)
-    return mdf, parameter
+    root, steps = to_root(mdf, same_lobe=True)
+    return (root, follow(steps, parameter)) if root.smith else None
 
 
 def _half_width_logarithms(target: Distribution, tangents: Array) -> Array:
@@ -526,8 +512,7 @@ def _half_width_logarithms(target: Distribution, tangents: Array) -> Array:
         raise MdfconvError(
             f"{target.name} of γ = {target.gamma:g} has no lobe whose half width can be measured"
         )
-    logarithms: Array = np.log(existing)
-    return logarithms
+    return np.asarray(np.log(existing))
 
 
 class _Problem:
@@ -543,7 +528,9 @@ class _Problem:
         self._is_log = lobe.options.loss == "log"
         values = self._values / self._unit
         weight = self._weight[:, None] * np.ones_like(values)
-        self._projection = Projection(values, weight, log=self._is_log, floor=lobe.has_floor)
+        self._project = projection.Projection(
+            values, weight, log=self._is_log, floor=lobe.has_floor
+        )
 
     def _check(self) -> None:
         values = self._values
@@ -582,7 +569,7 @@ class _Problem:
         """Return the costs of the points of a scan."""
         size = max(1, _SCANNED_AT_ONCE // self._values.size)
         blocks = [points[start : start + size] for start in range(0, len(points), size)]
-        residuals = (self._projection(self.lobe.at_points(block)).residual for block in blocks)
+        residuals = (self._project(self.lobe.at_points(block)).residual for block in blocks)
         return np.concatenate([np.sum(np.square(some), axis=(1, 2)) for some in residuals])
 
     def descend(self, point: Array) -> Array:
@@ -590,11 +577,11 @@ class _Problem:
         start, before = point, np.inf
         for _ in range(_STEPS):
             lobe, slopes = self.lobe.at(point), self.lobe.slopes(point)
-            residual, gain, _, scale = self._projection(lobe)
+            residual, gain, _, scale = self._project(lobe)
             cost = float(np.sum(np.square(residual)))
             if cost > before * (1 + _SMALLEST_STEP):
                 return self.refine(start)
-            slope = projected_slope(lobe, slopes, gain, scale)
+            slope = projection.projected_slope(lobe, slopes, gain, scale)
             step = np.linalg.lstsq(slope.T @ slope, slope.T @ residual.ravel(), rcond=None)[0]
             point, before = np.clip(point - step, *self.lobe.bounds), cost
             if np.abs(step).max() < _SMALLEST_STEP:
@@ -605,17 +592,12 @@ class _Problem:
         """Return the minimum whose valley a point lies in."""
         low, high = self.lobe.bounds
         tolerance = self.lobe.search.tolerance
-        point: Array = least_squares(
-            self.residual,
-            np.clip(start, low + _INSIDE, high - _INSIDE),
-            self.slope,
-            bounds=(low, high),
-            xtol=tolerance,
-            ftol=tolerance / 100,
-            gtol=tolerance / 100,
-            x_scale="jac",
-        ).x
-        return point
+        start = np.clip(start, low + _INSIDE, high - _INSIDE)
+        ends = {"xtol": tolerance, "ftol": tolerance / 100, "gtol": tolerance / 100}
+        result = least_squares(
+            self.residual, start, self.slope, bounds=(low, high), x_scale="jac", **ends
+        )
+        return np.asarray(result.x)
 
     def cost(self, point: Array) -> float:
         """Return the sum of the squared residuals."""
@@ -623,30 +605,30 @@ class _Problem:
 
     def residual(self, point: Array) -> Array:
         """Return the residuals, flattened."""
-        return self._projection(self.lobe.at(point)).residual.ravel()
+        return self._project(self.lobe.at(point)).residual.ravel()
 
     def slope(self, point: Array) -> Array:
         """Return ∂residual/∂point with the linear part projected out."""
         lobe = self.lobe.at(point)
-        _, gain, _, scale = self._projection(lobe)
-        return projected_slope(lobe, self.lobe.slopes(point), gain, scale)
+        _, gain, _, scale = self._project(lobe)
+        return projection.projected_slope(lobe, self.lobe.slopes(point), gain, scale)
 
     def report(self, point: Array) -> MeasuredFit:
         """Return the fit at a point, with standard errors from the full Jacobian."""
         lobe, slopes = self.lobe.at(point), self.lobe.slopes(point)
-        residual, gain, offset, scale = self._projection(lobe)
+        residual, gain, offset, scale = self._project(lobe)
         if not scale.any():
             raise MdfconvError(*self.lobe.refusal)
         searched = self.lobe.names
         names = [*searched, *list(self.lobe.linear) * scale.size]
-        matrix, undetermined = self._decomposed(jacobian(lobe, slopes, gain, scale), names)
+        matrix, undetermined = self._factored(projection.jacobian(lobe, slopes, gain, scale), names)
         count, unknowns = residual.size, len(names)
         cost = float(np.sum(np.square(residual)))
-        spread = np.sqrt(cost / (count - unknowns)) * standard_deviations(matrix)
+        spread = np.sqrt(cost / (count - unknowns)) * projection.standard_deviations(matrix)
         factors = np.array(list(self.lobe.linear.values()))[:, None]
         linear = factors * self._unit * np.stack([offset, scale])
         linear_errors = factors * (self._unit * spread[len(searched) :].reshape(-1, 2).T)
-        near, values = model(lobe, offset, scale), self._values / self._unit
+        near, values = projection.model(lobe, offset, scale), self._values / self._unit
         rmse = self._unit * float(np.sqrt(np.mean(np.square(near - values))))
         unit = 1.0 if self._is_log else self._unit
         likelihood = count * np.log(max(cost, np.finfo(float).tiny) / count)
@@ -681,14 +663,12 @@ class _Problem:
         is_near = np.minimum(point - low, high - point) < _AT_END
         return tuple(compress(self.lobe.names[first:], is_near[first:]))
 
-    def _decomposed(
-        self, blocks: Iterator[Array], names: list[str]
-    ) -> tuple[Array, tuple[str, ...]]:
+    def _factored(self, blocks: Iterator[Array], names: list[str]) -> tuple[Array, tuple[str, ...]]:
         """Return J, or its R, and the names of what the data do not tell apart."""
         if isinstance(self.lobe, _SliceLobe):
             whole = np.concatenate(list(blocks))
             return whole.reshape(-1, len(names)), ()
-        triangle = upper_triangle(
+        triangle = projection.upper_triangle(
             block[:, channel] for block in blocks for channel in range(block.shape[1])
         )
         return triangle, _undetermined(triangle, names)

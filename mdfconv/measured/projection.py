@@ -114,17 +114,16 @@ def jacobian(lobe: Array, slopes: list[Array], gain: Array, scale: Array) -> Ite
 
     The unknowns are the lobe's parameters, then offset and scale of each channel.
     """
-    channels = scale.size
+    channel = np.arange(scale.size)
+    offsets = len(slopes) + 2 * channel
     for start in range(0, lobe.size, _BLOCK):
         rows = slice(start, start + _BLOCK)
         part = gain[rows]
-        block = np.zeros((*part.shape, len(slopes) + 2 * channels))
+        block = np.zeros((*part.shape, len(slopes) + 2 * scale.size))
         for column, slope in enumerate(slopes):
             block[:, :, column] = part * slope[rows, None] * scale
-        for channel in range(channels):
-            first = len(slopes) + 2 * channel
-            block[:, channel, first] = part[:, channel]
-            block[:, channel, first + 1] = part[:, channel] * lobe[rows]
+        block[:, channel, offsets] = part
+        block[:, channel, offsets + 1] = part * lobe[rows, None]
         yield block
 
 

@@ -27,11 +27,6 @@ from mdfconv.output.records import markdown_text
 _DIGITS = 6
 # What a number is handed on as: to renderers with light from all around.
 _METRIC = "environment"
-# Of the many columns of fits to two directions.
-_CHIEF = (
-    "channel", "distribution", "parameter", "gamma", "rmse", "simplest",
-    "stderr", "error", "reflectance", "diffuse", "specular", "masking",
-)  # fmt: skip
 # Angles of incidence that a sentence can name.
 _NAMED = 12
 
@@ -67,13 +62,14 @@ def report_files(
     command: str,
     path: Path,
     *,
+    chief: Sequence[str],
     logarithms: bool,
 ) -> dict[Path, bytes]:
     """Return the files of the report on fits: one of HTML, or of Markdown with pictures beside it.
 
-    The rows are the table of fits, lists in it as text; the command is the line that makes the
-    report, and `logarithms` says whether the loss is that of logarithms. Raises as
-    `check_report_name`.
+    The rows are the table of fits, lists in it as text, of which those to two directions show the
+    `chief` columns; the command is the line that makes the report, and `logarithms` says whether
+    the loss is that of logarithms. Raises as `check_report_name`.
     """
     check_report_name(path)
     result = analysis.results[0]
@@ -81,7 +77,7 @@ def report_files(
         title=f"Fits to {analysis.name}",
         verdict=_verdict(result),
         facts=[*_facts(analysis), *analysis.notes],
-        rows=_table(rows),
+        rows=_table(rows, chief),
         snippets=_snippets(result.simplest.distribution, result.simplest.parameter),
         pictures=dict(draw_parts(analysis, logarithms=logarithms)),
         command=command,
@@ -95,12 +91,11 @@ def check_report_name(path: Path) -> None:
         raise MdfconvError(f"a report is an .html or a .md file, not {path.name}")
 
 
-def _table(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
+def _table(rows: Sequence[Mapping[str, Any]], chief: Sequence[str]) -> list[dict[str, str]]:
     """Return the table as text; of fits to two directions the chief columns that say something."""
     names = list(rows[0])
     if "specular" in names:
-        names = [name for name in _CHIEF if any(row.get(name, "") != "" for row in rows)]
-        names.sort(key=list(rows[0]).index)
+        names = [name for name in names if name in chief and any(row[name] != "" for row in rows)]
     return [{name: _cell(row[name]) for name in names} for row in rows]
 
 
@@ -164,12 +159,9 @@ def _snippets(mdf: Distribution, parameter: float) -> dict[str, str]:
 
 def _html(report: _Contents, path: Path) -> dict[Path, bytes]:
     escape = html.escape
-    columns = list(report.rows[0])
-    head = "".join(f"<th>{escape(column)}</th>" for column in columns)
-    body = "".join(
-        f"<tr>{''.join(f'<td>{escape(row[column])}</td>' for column in columns)}</tr>\n"
-        for row in report.rows
-    )
+    head = "".join(f"<th>{escape(column)}</th>" for column in report.rows[0])
+    cells = ("".join(f"<td>{escape(cell)}</td>" for cell in row.values()) for row in report.rows)
+    body = "".join(f"<tr>{row}</tr>\n" for row in cells)
     facts = "".join(f"<li>{escape(fact)}</li>\n" for fact in report.facts)
     snippets = "".join(
         f"<h3>{escape(name)}</h3>\n<pre>{escape(text)}</pre>\n"

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdfconv.brdf.microfacet import direction, half_vector
 from mdfconv.distributions.evaluation import Array
@@ -117,9 +118,7 @@ def samples(
     """
     _check_shapes(path, [angle], values, channels)
     whole = np.isfinite(angle) & np.isfinite(values).all(axis=1)
-    dropped = int(np.count_nonzero(~whole))
-    if dropped:
-        notes = (*notes, f"{dropped} of {whole.size} rows hold NaN or infinity and are left out")
+    notes += note_of(~whole, "rows hold NaN or infinity and are left out")
     if not whole.any():
         raise MdfconvError(f"{path}: no row with finite numbers")
     angle, values = angle[whole], values[whole]
@@ -187,10 +186,8 @@ def directional_samples(
     largest = 0.5 * np.pi - _HORIZON
     above = (np.abs(theta_incident) < largest) & (np.abs(theta_outgoing) < largest)
     keep = finite & above
-    for what, dropped in (("not finite", ~finite), ("at or below the horizon", finite & ~above)):
-        count = int(np.count_nonzero(dropped))
-        if count:
-            notes = (*notes, f"{count} of {keep.size} samples are {what} and left out")
+    notes += note_of(~finite, "samples are not finite and left out")
+    notes += note_of(finite & ~above, "samples are at or below the horizon and left out")
     if not keep.any():
         raise MdfconvError(f"{path}: no finite sample above the horizon")
     return DirectionalSamples(
@@ -200,6 +197,12 @@ def directional_samples(
         channels,
         notes,
     )
+
+
+def note_of(dropped: NDArray[np.bool_], what: str) -> tuple[str, ...]:
+    """Return a note on how many of the samples something is said of; none if of none."""
+    count = int(np.count_nonzero(dropped))
+    return (f"{count} of {dropped.size} {what}",) if count else ()
 
 
 def _check_shapes(

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers import READERS, Reader, ReadOptions, Source, read
-from mdfconv.measured.readers.merl import read_merl_directional
 from mdfconv.measured.samples import DirectionalSamples
 from tests.measured.scans import grid, measured, merl_bytes, rows, tensor_bytes
 from tests.measured.test_readers import alta, fred, zemax
@@ -117,7 +116,7 @@ def test_damaged_merl_as_a_whole(tmp_path, place, byte):
     path = tmp_path / "a.binary"
     path.write_bytes(content)
     try:
-        samples = read_merl_directional(path, count=10)
+        samples = read(path, ReadOptions(cells=10))
     except MdfconvError as error:
         check_message(str(error))
         return

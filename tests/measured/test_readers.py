@@ -8,7 +8,6 @@ import pytest
 
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers import ReadOptions, list_readers, read
-from mdfconv.measured.readers.merl import read_merl, read_merl_directional
 from mdfconv.measured.samples import (
     DirectionalSamples,
     Samples,
@@ -456,35 +455,32 @@ def test_astm(tmp_path, mark, unit):
 def test_merl_as_a_whole(tmp_path):
     content = merl_bytes()
     path = write(tmp_path, content, "a.binary")
-    samples = read_merl_directional(path, count=600, seed=4)
+    samples = read(path, ReadOptions(cells=600))
     assert 300 < len(samples.values) <= 600
     np.testing.assert_allclose(
         samples.values, np.outer(ggx(samples.incident, samples.outgoing), np.ones(3)), rtol=1e-9
     )
     assert min(samples.incident[:, 2].min(), samples.outgoing[:, 2].min()) > 0
-    again = read_merl_directional(path, count=600, seed=4)
-    other = read_merl_directional(path, count=600, seed=5)
+    again = read(path, ReadOptions(cells=600))
     np.testing.assert_array_equal(samples.values, again.values)
-    assert not np.array_equal(samples.values, other.values)
     # As many of every θ_h.
     theta_h = np.round(np.arccos(np.clip(samples.half[:, 2], -1, 1)), 6)
     _, counts = np.unique(theta_h, return_counts=True)
     assert counts.max() <= 50
     assert any("by chance and as many of every θ_h" in note for note in samples.notes)
-    everything = read_merl_directional(path, count=10**6)
+    everything = read(path, ReadOptions(cells=10**6))
     cells = np.frombuffer(content, "<f8", offset=12).reshape(3, -1)
     assert 0.3 * (cells[0] >= 0).sum() < len(everything.values) <= (cells[0] >= 0).sum()
 
 
 def test_merl_without_its_name(tmp_path):
     path = write(tmp_path, merl_bytes(), "unnamed")
-    ours, theirs = read(path), read_merl(path)
+    ours, theirs = read(path), read(write(tmp_path, merl_bytes(), "named.binary"))
     assert isinstance(ours, Samples)
     np.testing.assert_array_equal(ours.values, theirs.values)
+    path = write(tmp_path, np.array([1, 1, 1], "<i4").tobytes() + b"\xff" * 24, "none.binary")
     with pytest.raises(MdfconvError, match="no finite"):
-        read_merl_directional(
-            write(tmp_path, np.array([1, 1, 1], "<i4").tobytes() + b"\xff" * 24, "none.binary")
-        )
+        read(path, ReadOptions(cells=20000))
 
 
 def density(theta):

@@ -15,15 +15,8 @@ import numpy as np
 from mdfconv.brdf.microfacet import direction
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.readers.base import (
-    Reader,
-    ReadOptions,
-    Source,
-    decode_head,
-    from_half_and_difference,
-    known_by,
-    samples_of_vectors,
-)
+from mdfconv.measured.readers import base
+from mdfconv.measured.readers.base import Reader, ReadOptions, Source
 from mdfconv.measured.readers.tables import parse_table
 from mdfconv.measured.samples import Measurements, samples
 
@@ -36,18 +29,17 @@ _WEIGHTED = "INV_STERADIAN_COSINE_FACTOR"
 _PLAIN = ("INV_STERADIAN", "RGB_COLOR")
 
 
-def _projected(theta: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    return direction(theta), direction(np.hypot(x, y), np.arctan2(y, x))
-
-
 def _half_and_difference(*angles: Array) -> tuple[Array, Array]:
-    view, light = from_half_and_difference(*angles)
+    view, light = base.from_half_and_difference(*angles)
     return light, view
 
 
 # How many inputs there are, and light and view of them.
 _TWO_DIRECTIONS: dict[str, tuple[int, Callable[..., tuple[Array, Array]]]] = {
-    "ISOTROPIC_TL_TV_PROJ_DPHI": (3, _projected),
+    "ISOTROPIC_TL_TV_PROJ_DPHI": (
+        3,
+        lambda tl, x, y: (direction(tl), direction(np.hypot(x, y), np.arctan2(y, x))),
+    ),
     "ISOTROPIC_TV_TL_DPHI": (3, lambda tv, tl, dphi: (direction(tl, dphi), direction(tv))),
     "SPHERICAL_TL_PL_TV_PV": (4, lambda tl, pl, tv, pv: (direction(tl, pl), direction(tv, pv))),
     "RUSIN_TH_TD_PD": (3, lambda th, td, pd: _half_and_difference(th, 0 * th, td, pd)),
@@ -59,10 +51,9 @@ _TWO_DIRECTIONS: dict[str, tuple[int, Callable[..., tuple[Array, Array]]]] = {
 def _read(source: Source, options: ReadOptions) -> Measurements:
     path = source.path
     options.refuse(path, "ALTA's header names its columns")
-    tags = dict(_TAG.findall("\n".join(decode_head(source.head).splitlines())))
-    inputs, outputs = _dimensions(path, tags.get("DIM", ""))
+    tags = dict(_TAG.findall("\n".join(base.decode_head(source.head).splitlines())))
     parametrization = tags.get("PARAM_IN", "").upper()
-    _check_parametrization(path, parametrization, inputs)
+    inputs, outputs = _dimensions(path, tags.get("DIM", ""), parametrization)
     numbers = _numbers(source, tags, inputs, outputs)
     x, values = numbers[:, :inputs], numbers[:, inputs : inputs + outputs]
     names = ("R", "G", "B") if outputs == 3 else tuple(str(n + 1) for n in range(outputs))
@@ -80,17 +71,15 @@ def _read(source: Source, options: ReadOptions) -> Measurements:
         if kind == _WEIGHTED:
             values = values / np.where(view[:, 2:] > 0, view[:, 2:], np.nan)
             notes += ("the values hold the cosine of the view, by which they are divided",)
-        return samples_of_vectors(path, light, view, values, names, notes)
+        return base.samples_of_vectors(path, light, view, values, names, notes)
 
 
-def _dimensions(path: Path, text: str) -> tuple[int, int]:
+def _dimensions(path: Path, text: str, parametrization: str) -> tuple[int, int]:
+    """Return how many inputs and outputs there are, if they go with the parametrization."""
     words = text.split()
     if len(words) < 2 or not all(re.fullmatch("[0-9]{1,3}", word) for word in words[:2]):
         raise MdfconvError(f"{path}: ALTA data of dimension '{text}'", "two whole numbers go there")
-    return int(words[0]), int(words[1])
-
-
-def _check_parametrization(path: Path, parametrization: str, inputs: int) -> None:
+    inputs, outputs = map(int, words[:2])
     sizes = {name: size for name, (size, _) in _TWO_DIRECTIONS.items()}
     known = dict.fromkeys(_ONE_ANGLE, 1) | sizes
     if parametrization not in known:
@@ -102,6 +91,7 @@ def _check_parametrization(path: Path, parametrization: str, inputs: int) -> Non
             f"{path}: ALTA data of {inputs} inputs, where {parametrization} has "
             f"{known[parametrization]}"
         )
+    return inputs, outputs
 
 
 def _numbers(source: Source, tags: dict[str, str], inputs: int, outputs: int) -> Array:
@@ -135,4 +125,4 @@ def _binary(source: Source, tags: dict[str, str], width: int) -> Array:
     return np.frombuffer(content, f"{order}f8", size, start).astype(float).reshape(-1, width)
 
 
-READER = Reader("ALTA", known_by(_DIMENSIONS), _read)
+READER = Reader("ALTA", base.known_by(_DIMENSIONS), _read)

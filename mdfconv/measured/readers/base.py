@@ -20,11 +20,7 @@ from mdfconv.output.files import STANDARD_INPUT
 
 # Laboratories write pages of comments before the words that a format is known by.
 _HEAD_BYTES = 65536
-_BYTE_ORDER_MARKS = {
-    b"\xef\xbb\xbf": "utf-8-sig",
-    b"\xff\xfe": "utf-16",
-    b"\xfe\xff": "utf-16",
-}
+_BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 
 # They are quoted in messages, which are one line and say nothing to a terminal.
 _CONTROLS = dict.fromkeys(

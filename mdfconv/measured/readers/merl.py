@@ -6,20 +6,12 @@ invalid. Of n angles, θ_h of index i is (i/n)² π/2, θ_d is i/n · π/2 and �
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.readers.base import (
-    Reader,
-    ReadOptions,
-    Source,
-    from_half_and_difference,
-    open_source,
-    samples_of_vectors,
-)
+from mdfconv.measured.readers import base
+from mdfconv.measured.readers.base import Reader, ReadOptions, Source
 from mdfconv.measured.samples import DirectionalSamples, Measurements, Samples, samples
 
 _HEADER_BYTES = 12
@@ -30,27 +22,18 @@ _LARGEST_DIMENSION = 4096
 _CHANNELS = ("R", "G", "B")
 # A cell counts as above the horizon from this cosine on.
 _HORIZON = 1e-5
+# Of the choice of cells: the same each time.
+_SEED = 0
 
 
-def read_merl(path: Path) -> Samples:
-    """Read the slice θ_d ≈ 0 of a MERL file, averaged over φ_d."""
-    return _slice(open_source(path))
-
-
-def read_merl_directional(
-    path: Path | str, count: int = 20000, seed: int = 0
-) -> DirectionalSamples:
-    """Read about so many valid cells of a MERL file, by chance, as many of every θ_h.
+def _cells(source: Source, count: int) -> DirectionalSamples:
+    """Return about so many valid cells, by chance, as many of every θ_h.
 
     θ_h is dense where lobes are, so that equally many cells of each show the peak.
     """
-    return _cells(open_source(path), count, seed)
-
-
-def _cells(source: Source, count: int, seed: int = 0) -> DirectionalSamples:
     planes = _planes(source)
     _, half, difference, azimuth = planes.shape
-    generator = np.random.default_rng(seed)
+    generator = np.random.default_rng(_SEED)
     theta_d, phi_d = np.meshgrid(
         np.arange(difference) / difference * (np.pi / 2),
         np.arange(azimuth) / azimuth * np.pi,
@@ -60,7 +43,7 @@ def _cells(source: Source, count: int, seed: int = 0) -> DirectionalSamples:
     wanted = max(1, -(-count // half))
     directions, values = [], []
     for index, beta in enumerate(_half_angles(half)[:, None]):
-        first, second = from_half_and_difference(beta, zero, theta_d.ravel(), phi_d.ravel())
+        first, second = base.from_half_and_difference(beta, zero, theta_d.ravel(), phi_d.ravel())
         cells = planes[:, index].reshape(3, -1)
         valid = (np.isfinite(cells) & (cells >= 0)).all(axis=0)
         above = (first[:, 2] > _HORIZON) & (second[:, 2] > _HORIZON)
@@ -71,10 +54,11 @@ def _cells(source: Source, count: int, seed: int = 0) -> DirectionalSamples:
     incident, outgoing = np.concatenate(directions, axis=1)
     taken = np.concatenate(values)
     note = f"{len(taken)} of {planes[0].size} cells are taken, by chance and as many of every θ_h"
-    return samples_of_vectors(source.path, incident, outgoing, taken, _CHANNELS, (note,))
+    return base.samples_of_vectors(source.path, incident, outgoing, taken, _CHANNELS, (note,))
 
 
 def _slice(source: Source) -> Samples:
+    """Return the slice θ_d ≈ 0, averaged over φ_d."""
     planes = _planes(source)
     half = planes.shape[1]
     mirror = np.array(planes[:, :, 0, :])
@@ -110,13 +94,10 @@ def _planes(source: Source) -> Array:
     return numbers.reshape(3, half, difference, azimuth)
 
 
-def _dimensions(head: bytes) -> tuple[int, int, int] | None:
-    if len(head) < _HEADER_BYTES:
-        return None
-    first, second, third = (int(count) for count in np.frombuffer(head, "<i4", 3))
-    if min(first, second, third) < 1 or max(first, second, third) > _LARGEST_DIMENSION:
-        return None
-    return first, second, third
+def _dimensions(head: bytes) -> list[int] | None:
+    """Return how many θ_h, θ_d and φ_d a header says there are; None if it is none."""
+    counts = np.frombuffer(head, "<i4", 3).tolist() if len(head) >= _HEADER_BYTES else [0]
+    return counts if min(counts) >= 1 and max(counts) <= _LARGEST_DIMENSION else None
 
 
 def _recognizes(name: str, head: bytes) -> bool:

@@ -180,16 +180,11 @@ class TableForm:
         return next((other for other in others if len(other) == width), cells)
 
 
+_BLANKS = TableForm(None)
 # Those with decimal points first: of forms that read a table alike, the first is taken.
 _FORMS = (
-    TableForm(";"),
-    TableForm("\t"),
-    TableForm(","),
-    TableForm(None),
-    TableForm(";", decimal_comma=True),
-    TableForm("\t", decimal_comma=True),
-    TableForm(None, decimal_comma=True),
-    TableForm(",", decimal_comma=True),
+    *(TableForm(separator) for separator in (";", "\t", ",", None)),
+    *(TableForm(separator, decimal_comma=True) for separator in (";", "\t", None, ",")),
 )
 
 
@@ -236,8 +231,7 @@ def parse_table(path: Path, lines: Iterable[str]) -> Table:
     """
     rows, comments = [], []
     for place, line in enumerate(lines, start=1):
-        mark = _COMMENT.match(line)
-        if mark:
+        if mark := _COMMENT.match(line):
             comments.append(line[mark.end() :].strip())
         elif line.strip():
             rows.append((place, line.strip()))
@@ -255,14 +249,11 @@ def parse_table(path: Path, lines: Iterable[str]) -> Table:
 
 def _form_of(lines: Sequence[str]) -> TableForm:
     """Return the form under which the most lines are numbers, more than one a line if any is."""
-    rows = [[form.numbers(line) for line in lines] for form in _FORMS]
-    wide = [sum(row is not None and len(row) > 1 for row in read) for read in rows]
+    wide = [sum(len(form.numbers(line) or ()) > 1 for line in lines) for form in _FORMS]
     if max(wide):
         return _FORMS[wide.index(max(wide))]
-    separators = (
-        form for form in _FORMS if lines and form.separator and form.separator in lines[0]
-    )
-    return next(separators, TableForm(None))
+    first = lines[0] if lines else ""
+    return next((form for form in _FORMS if form.separator and form.separator in first), _BLANKS)
 
 
 def _numbers(
@@ -312,9 +303,8 @@ def _no_numbers(path: Path, place: int, line: str) -> MdfconvError:
 def _without_empty_column(table: Table) -> Table:
     """Leave out a last column that only a separator at the end of every line makes."""
     numbers = table.numbers
-    if numbers.shape[1] < 2 or not np.isnan(numbers[:, -1]).all():
-        return table
-    if table.is_named and table.names[-1]:
+    is_empty = numbers.shape[1] > 1 and np.isnan(numbers[:, -1]).all()
+    if not is_empty or (table.is_named and table.names[-1]):
         return table
     return replace(table, names=table.names[:-1], units=table.units[:-1], numbers=numbers[:, :-1])
 

@@ -10,19 +10,9 @@ import numpy as np
 
 from mdfconv.brdf.microfacet import mirrored, polar_angle
 from mdfconv.distributions.evaluation import Array
+from mdfconv.measured.readers import tables
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source
-from mdfconv.measured.readers.tables import (
-    Role,
-    Table,
-    counts_rows,
-    is_angle,
-    is_counting,
-    is_half,
-    is_value,
-    is_wavelength,
-    parse_table,
-    role_of,
-)
+from mdfconv.measured.readers.tables import Role, Table, parse_table
 from mdfconv.measured.samples import (
     UNITS,
     DirectionalSamples,
@@ -62,11 +52,9 @@ def read_table(table: Table, options: ReadOptions) -> Measurements:
     if meaning not in (None, *_MEANINGS):
         raise unknown_name("angle", meaning, list(_MEANINGS))
     columns = _Columns(table, options)
-    if options.angle is None and meaning is None:
-        directions = columns.directions()
-        if directions is not None:
-            return directions
-    return columns.one_angle()
+    is_of_one = options.angle is not None or meaning is not None
+    directions = None if is_of_one else columns.directions()
+    return directions or columns.one_angle()
 
 
 class _Columns:
@@ -79,11 +67,8 @@ class _Columns:
         self._table, self._options = table, options
         self._notes = list(table.notes)
         self._names = dict(enumerate(table.names)) if table.is_named else {}
-        self._counting = [
-            index
-            for index, name in self._names.items()
-            if counts_rows(name, table.numbers[:, index])
-        ]
+        named = ((index, name, table.numbers[:, index]) for index, name in self._names.items())
+        self._counting = [index for index, name, rows in named if tables.counts_rows(name, rows)]
 
     def directions(self) -> DirectionalSamples | None:
         """Return samples of two directions; None if the table has no zenith of both."""
@@ -112,18 +97,10 @@ class _Columns:
                 f"'{incidence.string[:60]}'"
             )
         self._complete_azimuths(angles)
-        return _oriented(
-            directional_samples(
-                table.path,
-                angles[Role.theta_i],
-                angles[Role.phi_i],
-                angles[Role.theta_o],
-                angles[Role.phi_o],
-                values,
-                channels,
-                (*self._notes, *value_notes),
-            )
-        )
+        light = angles[Role.theta_i], angles[Role.phi_i]
+        view = angles[Role.theta_o], angles[Role.phi_o]
+        notes = (*self._notes, *value_notes)
+        return _oriented(directional_samples(table.path, *light, *view, values, channels, notes))
 
     def one_angle(self) -> Measurements:
         """Return samples of one angle, or of two directions of which one is the normal."""
@@ -147,7 +124,7 @@ class _Columns:
             return directional_samples(
                 table.path, first, zero, second, zero, values, channels, (*notes, note)
             )
-        if not (table.is_named and is_half(table.names[column])):
+        if not (table.is_named and tables.is_half(table.names[column])):
             other = "" if meaning else ", not of a direction"
             read = f"{table.listed([column])} is read as the angle between normal and half vector"
             notes += (read + other,)
@@ -156,14 +133,11 @@ class _Columns:
     def _by_role(self) -> dict[Role, int]:
         """Return the columns of angles by what they hold."""
         table, options = self._table, self._options
-        chosen = {
-            role: table.column(getattr(options, role.name))
-            for role in _DIRECTIONS
-            if getattr(options, role.name)
-        }
+        named = {role: getattr(options, role.name) for role in _DIRECTIONS}
+        chosen = {role: table.column(name) for role, name in named.items() if name}
         columns, bare = dict(chosen), []
         for index, name in self._names.items():
-            role = role_of(name)
+            role = tables.role_of(name)
             if index in chosen.values() or name in options.values or role is None or role in chosen:
                 continue
             if role is Role.angle:
@@ -188,7 +162,7 @@ class _Columns:
             return table.column(self._options.angle)
         several = len(table.names) > 2
         if not table.is_named:
-            if several and is_counting(table.numbers[:, 0]):
+            if several and tables.is_counting(table.numbers[:, 0]):
                 raise table.error(
                     "column 1 counts 0, 1, 2 … or 1, 2, 3 …: an index, or degrees",
                     f"choose the column of angles, from 1 to {len(table.names)}",
@@ -196,11 +170,11 @@ class _Columns:
                 )
             self._notes += ["no names of columns: the first is taken for the angle"] * several
             return 0
-        angles = [index for index, name in self._names.items() if is_angle(name)]
+        angles = [index for index, name in self._names.items() if tables.is_angle(name)]
         if len(angles) == 1:
             return angles[0]
         rest = [index for index in self._names if index not in self._counting]
-        others = [index for index in rest[1:] if not is_value(table.names[index])]
+        others = [index for index in rest[1:] if not tables.is_value(table.names[index])]
         if angles or not rest or (len(rest) > 2 and others):
             raise table.error(
                 f"{'several columns are' if angles else 'no column is'} called an angle; "
@@ -221,7 +195,7 @@ class _Columns:
         table = self._table
         for index, name in self._names.items():
             different = np.unique(table.numbers[:, index]).size
-            if is_wavelength(name) and different > 1:
+            if tables.is_wavelength(name) and different > 1:
                 raise table.error(
                     f"column '{name}' has {different} wavelengths, whose values would be mixed",
                     "keep the rows of one",
@@ -230,16 +204,14 @@ class _Columns:
             return [table.column(name) for name in self._options.values], []
         counting = [index for index in self._counting if index not in angles]
         rest = [index for index in range(len(table.names)) if index not in (*angles, *counting)]
-        chosen = [index for index in rest if is_value(self._names.get(index, ""))] or rest
+        chosen = [index for index in rest if tables.is_value(self._names.get(index, ""))] or rest
         if not chosen:
             raise table.error(
                 f"{'one column is' if len(table.names) == 1 else 'the columns are'} not enough",
                 "it takes an angle and a value",
             )
-        notes = [
-            f"column '{table.names[index]}' counts the rows and is passed over"
-            for index in counting
-        ]
+        remark = "counts the rows and is passed over"
+        notes = [f"column '{table.names[index]}' {remark}" for index in counting]
         others = [index for index in rest if index not in chosen]
         if others:
             notes.append(
@@ -255,22 +227,15 @@ class _Columns:
             if not known:
                 raise unknown_name("angle unit", asked, list(UNITS))
             return known[0]
-        texts = [f"{self._table.names[i]} {self._table.units[i]}".lower() for i in columns]
-        return next(
-            (
-                unit
-                for unit, marks in _MARKS.items()
-                if any(mark in text for mark in marks for text in texts)
-            ),
-            None,
-        )
+        headings = [f"{self._table.names[i]} {self._table.units[i]}".lower() for i in columns]
+        text = " ".join(headings)
+        marked = (unit for unit, marks in _MARKS.items() if any(mark in text for mark in marks))
+        return next(marked, None)
 
     def _unit_of_angle(self, column: int) -> str:
         unit = self._unit([column])
-        if unit:
-            return unit
-        if self._largest(column) > UNITS["radians"].largest * _SLACK:
-            return "degrees"
+        if unit or self._largest(column) > UNITS["radians"].largest * _SLACK:
+            return unit or "degrees"
         raise self._table.error(
             f"column '{self._table.names[column]}' does not say whether it holds degrees, radians "
             "or cosines",

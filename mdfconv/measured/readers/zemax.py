@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mdfconv.brdf.microfacet import azimuth as azimuths
-from mdfconv.brdf.microfacet import direction, polar_angle
+from mdfconv.brdf import microfacet
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, known_by, turn_from_normal
@@ -69,14 +68,11 @@ class _Words:
         """Return the next numbers, shape (count,)."""
         if len(self._words) - self._at < count:
             raise MdfconvError(f"{self._path}: truncated: it ends within {what}")
-        numbers = np.empty(count)
-        for place in range(count):
-            word = self.next(what)
-            try:
-                numbers[place] = float(word)
-            except ValueError:
-                raise self.error(f"{what}: '{word[:30]}' is no number") from None
-        return numbers
+        word = ""
+        try:
+            return np.array([float(word := self.next(what)) for _ in range(count)])
+        except ValueError:
+            raise self.error(f"{what}: '{word[:30]}' is no number") from None
 
     def error(self, reason: str) -> MdfconvError:
         """Return an error about the word that was last read."""
@@ -144,9 +140,9 @@ def _samples(
         angle[is_sample & measured] for angle in np.meshgrid(*axes, indexing="ij")
     )
     # About the specular direction at azimuth 0, where x points away from the normal.
-    about = direction(radial, np.pi + azimuth)
+    about = microfacet.direction(radial, np.pi + azimuth)
     outgoing = turn_from_normal(about, incidence, rotation)
-    view = polar_angle(outgoing), azimuths(outgoing)
+    view = microfacet.polar_angle(outgoing), microfacet.azimuth(outgoing)
     values = values[is_sample & measured]
     return directional_samples(
         path, incidence, np.pi + rotation, *view, values, tuple(channels), notes

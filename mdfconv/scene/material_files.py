@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain, count
+from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, AnyStr
 
 from mdfconv.errors import MdfconvError
 from mdfconv.output.files import write_files
@@ -60,20 +62,25 @@ def is_folder(output: str) -> bool:
 
 def free_name(folder: Path, stem: str, suffix: str, taken: Container[Path]) -> Path:
     """Return a path in a folder that is none of those taken: of ``wood`` also ``wood_2``."""
-    path, count = folder / f"{stem}{suffix}", 1
-    while path in taken:
-        count += 1
-        path = folder / f"{stem}_{count}{suffix}"
-    return path
+    endings = chain([""], (f"_{number}" for number in count(2)))
+    paths = (folder / f"{stem}{ending}{suffix}" for ending in endings)
+    return next(path for path in paths if path not in taken)
 
 
 def _free_backup(file: Path) -> Path:
     """Return a name for the backup that no file has."""
-    backup, count = file.with_name(f"{file.name}.bak"), 1
-    while backup.exists():
-        count += 1
-        backup = file.with_name(f"{file.name}.bak{count}")
-    return backup
+    backups = (file.with_name(f"{file.name}.bak{number}") for number in chain([""], count(2)))
+    return next(backup for backup in backups if not backup.exists())
+
+
+def spliced(text: AnyStr, edits: Iterable[tuple[int, int, AnyStr]]) -> AnyStr:
+    """Return a text with pieces replaced, each from its start to its end, of which none overlap."""
+    pieces: list[AnyStr] = []
+    position = 0
+    for start, end, new in sorted(edits, key=itemgetter(0, 1)):
+        pieces += [text[position:start], new]
+        position = end
+    return text[:0].join(pieces) + text[position:]
 
 
 class TextureFolder:
@@ -169,15 +176,10 @@ def write_conversions(
     MdfconvError
         If a file cannot be written, or two differ and have one name; nothing is then changed.
     """
-    changed = [
-        (destination, original, conversion)
-        for destination, original, conversion in converted
-        if not (destination.backup and conversion.data == original)
-    ]
+    changed = [each for each in converted if not (each[0].backup and each[2].data == each[1])]
     contents: dict[Path, bytes] = {}
     backups: dict[Path, Path] = {}
-    new: set[Path] = set()
-    for destination, original, conversion in changed:
+    for destination, original, _ in changed:
         if destination.backup:
             if read_file(destination.source) != original:
                 raise MdfconvError(
@@ -185,14 +187,13 @@ def write_conversions(
                 )
             contents[destination.backup] = original
             backups[destination.backup] = destination.source
-            new.add(destination.backup)
-        elif not force:
-            new.add(destination.output)
-        if not force:
-            new |= set(conversion.files)
+    new = set(backups)
     for destination, _, conversion in changed:
-        for path, data in {destination.output: conversion.data, **conversion.files}.items():
+        results = {destination.output: conversion.data, **conversion.files}
+        for path, data in results.items():
             if contents.setdefault(path, data) != data:
                 raise MdfconvError(f"two results would both be written to {path}")
+        if not force:
+            new |= conversion.files.keys() if destination.backup else results.keys()
     write_files(contents, new=new, like=backups)
     return [destination for destination, *_ in changed]

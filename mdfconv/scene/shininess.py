@@ -136,14 +136,13 @@ def encoding_records(metric: Metric) -> list[dict[str, Any]]:
     exponent ``roughness_100`` and ``rmse_100``, and so on for each of `EXPONENTS`: of GGX in
     Blinn/Phong's place, with a specular weight of 1; infinite for a mirror.
     """
-    columns = [f"{what}_{n}" for n in EXPONENTS for what in ImporterResult._fields]
     by_exponent = importer_results(np.array(EXPONENTS, float), metric)
     records = []
     for owner in list_distributions():
         for end, dialect in stored_forms(owner):
             assert end.encoding is not None, "it is a stored form"
             name = dialect.name if dialect else end.encoding.name
-            record = {
+            record: dict[str, Any] = {
                 "encoding": f"{owner.name}:{name}",
                 "formula": end.encoding.formula,
                 "range": end.stored.legal,
@@ -153,11 +152,8 @@ def encoding_records(metric: Metric) -> list[dict[str, Any]]:
                 "note": dialect.note if dialect else "",
                 "specular": (dialect.specular if dialect else Specular.no).value,
             }
-            costs = {
-                f"{what}_{n}": value
-                for n, results in zip(EXPONENTS, by_exponent, strict=True)
-                if name in results
-                for what, value in results[name]._asdict().items()
-            }
-            records.append(record | dict.fromkeys(columns) | costs)
+            for n, results in zip(EXPONENTS, by_exponent, strict=True):
+                roughness, rmse = results.get(name, (None, None))
+                record |= {f"roughness_{n}": roughness, f"rmse_{n}": rmse}
+            records.append(record)
     return records

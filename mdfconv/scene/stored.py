@@ -198,9 +198,7 @@ class StoredConverter:
             storable: Mask = self.target.stored.accepts(result)
         if self.target.encoding:
             storable |= self.target.encoding.clamped(result)
-        if self._largest < np.inf:
-            storable &= result <= self._largest
-        return storable
+        return storable & (result <= self._largest)
 
 
 class ProblemKind(Enum):

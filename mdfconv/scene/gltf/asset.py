@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import isclose
 from operator import attrgetter
@@ -17,18 +17,13 @@ from mdfconv.distributions.endpoint import Endpoint, endpoints
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError, MdfconvWarning
 from mdfconv.fitting.metrics import Metric, metric_named
+from mdfconv.scene import stored
 from mdfconv.scene.gltf.document import FACTOR, PBR, GltfDocument
 from mdfconv.scene.gltf.images import GltfTextures
 from mdfconv.scene.gltf.textures import TextureConversion
 from mdfconv.scene.material_files import FileConversion
 from mdfconv.scene.shininess import ROUGHNESS
-from mdfconv.scene.stored import (
-    ConvertedNumber,
-    MaterialProblem,
-    Outcome,
-    ProblemKind,
-    StoredConverter,
-)
+from mdfconv.scene.stored import MaterialProblem, Outcome, ProblemKind
 
 _LIMITS = {Outcome.UNIFORM: "a uniform lobe", Outcome.MIRROR: "a mirror"}
 # Digits enough that an exponent comes back from a roughness to six.
@@ -133,9 +128,10 @@ def convert_gltf(
         ]
         problems |= changes.problems
     else:
-        problem = "has a roughness texture", ProblemKind.TEXTURE
-        problems |= dict.fromkeys(textured, problem)
-    numbers, reasons, notes = _numbers(plain.values(), StoredConverter(*pair, metric, largest=1))
+        problems |= dict.fromkeys(textured, ("has a roughness texture", ProblemKind.TEXTURE))
+    numbers, reasons, notes = _numbers(
+        plain.values(), stored.StoredConverter(*pair, metric, largest=1)
+    )
     for at, factor in plain.items():
         if factor in reasons:
             problems[at] = reasons[factor], ProblemKind.OTHER
@@ -143,7 +139,9 @@ def convert_gltf(
             _, parameter, result, _, rmse = numbers[factor]
             row = factor, result, rmse, parameter, notes.get(factor, ())
             materials.append(GltfMaterial(document.name(at), at, *row))
-    document.set_factors(_texts(materials))
+    for each in materials:
+        if not isclose(each.value, each.result, rel_tol=_SAME):
+            document.set_factor(each.index, f"{each.result:.{_DIGITS}g}")
     return GltfConversion(
         data=document.encoded(),
         materials=tuple(sorted(materials, key=attrgetter("index"))),
@@ -170,9 +168,7 @@ def factor_endpoints(source: str | Endpoint, target: str | Endpoint) -> tuple[En
     return pair
 
 
-def _factors(
-    document: GltfDocument,
-) -> tuple[dict[int, float], dict[int, tuple[str, ProblemKind]]]:
+def _factors(document: GltfDocument) -> tuple[dict[int, float], dict[int, tuple[str, ProblemKind]]]:
     """Return the roughness factors by the places of their materials, and what is wrong."""
     factors: dict[int, float] = {}
     problems: dict[int, tuple[str, ProblemKind]] = {}
@@ -200,8 +196,8 @@ def _factor(material: Any) -> float:
 
 
 def _numbers(
-    factors: Iterable[float], convert: StoredConverter
-) -> tuple[dict[float, ConvertedNumber], dict[float, str], dict[float, tuple[str, ...]]]:
+    factors: Iterable[float], convert: stored.StoredConverter
+) -> tuple[dict[float, stored.ConvertedNumber], dict[float, str], dict[float, tuple[str, ...]]]:
     """Return conversions of factors, why some have none, and what to know of mirrors and such."""
     numbers = convert.table(factors)
     reasons: dict[float, str] = {}
@@ -214,24 +210,11 @@ def _numbers(
         elif number.outcome is not Outcome.CONVERTED:
             reasons[factor] = convert.refusal(number)
     converted = [each for each in numbers.values() if each.outcome is Outcome.CONVERTED]
-    parameter = np.array([each.parameter for each in converted])
-    stored = np.array([each.result for each in converted])
-    results = Converted(parameter, stored, convert.target.decode_legal(stored))
-    sentences = convert.rule.true_cautions(results)
-    if sentences:
+    parameter, result = (np.array([each[at] for each in converted]) for at in (1, 2))
+    results = Converted(parameter, result, convert.target.decode_legal(result))
+    if sentences := convert.rule.true_cautions(results):
         warnings.warn("; ".join(sentences), MdfconvWarning, stacklevel=3)
     return numbers, reasons, notes
-
-
-def _texts(materials: Sequence[GltfMaterial]) -> dict[int, str]:
-    """Return the factors that differ in the digits that are written, by their places."""
-    changed = {
-        entry.index: entry.result
-        for entry in materials
-        if not isclose(entry.value, entry.result, rel_tol=_SAME)
-    }
-    texts = {result: f"{result:.{_DIGITS}g}" for result in set(changed.values())}
-    return {at: texts[result] for at, result in changed.items()}
 
 
 def generator_of(data: bytes) -> str:
@@ -239,9 +222,7 @@ def generator_of(data: bytes) -> str:
     return GltfDocument(data).generator
 
 
-def dialects_by_generator(generator: str) -> Iterator[Dialect]:
-    """Yield the dialects of the programs that a generator may name."""
+def dialects_by_generator(generator: str) -> list[Dialect]:
+    """Return the dialects of the programs that a generator may name."""
     text = generator.lower()
-    for dialect in DIALECTS:
-        if any(piece in text for piece in dialect.generators):
-            yield dialect
+    return [each for each in DIALECTS if any(piece in text for piece in each.generators)]

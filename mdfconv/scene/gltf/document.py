@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 from urllib.parse import unquote
@@ -42,6 +43,7 @@ class GltfDocument:
         # What is behind the JSON in a GLB.
         self._text, self._chunks = _pieces(data) if is_glb(data) else (data, [])
         self._appended = bytearray()
+        self._added: defaultdict[str, list[str]] = defaultdict(list)
         self.json = read_json(self._text)
         asset = self.json.value.get("asset")
         self._asset = asset if isinstance(asset, dict) else {}
@@ -90,10 +92,10 @@ class GltfDocument:
             return []
         return self.json.elements(place.start)
 
-    def append(self, name: str, values: list[str]) -> None:
-        """Add values in JSON to an array of the file that is not empty."""
-        if values:
-            self.json.append(self.json.root[name].start, values)
+    def append(self, name: str, value: str) -> int:
+        """Add a value in JSON to an array of the file that is not empty; return its index."""
+        self._added[name].append(value)
+        return len(self.json.value[name]) + len(self._added[name]) - 1
 
     def name(self, at: int) -> str:
         """Return the name of a material, "" if it has none."""
@@ -104,33 +106,8 @@ class GltfDocument:
         """Return what a material says of its texture of roughness, None if it has none."""
         return self.materials[at].get(PBR, {}).get(TEXTURE)
 
-    def set_factors(self, factors: Mapping[int, str]) -> None:
-        """Set the roughness factors of materials, by their places, to numbers in JSON."""
-        known = self._factor_spans
-        for at, text in factors.items():
-            if at in known:
-                self.json.replace(*known[at], text)
-            else:
-                self._set_factor(at, text)
-
-    @cached_property
-    def _factor_spans(self) -> dict[int, tuple[int, int]]:
-        """Where factors stand, by the places of materials, if names alone tell that."""
-        owners = [
-            at
-            for at, material in enumerate(self.materials)
-            if isinstance(material, dict)
-            and isinstance(pbr := material.get(PBR), dict)
-            and FACTOR in pbr
-        ]
-        if not owners:
-            return {}
-        spans = self.json.numbers_named(FACTOR, self.json.root["materials"])
-        # As many as there are factors: then none of them is anything else.
-        same = spans is not None and len(spans) == len(owners)
-        return dict(zip(owners, spans, strict=True)) if spans and same else {}
-
-    def _set_factor(self, at: int, text: str) -> None:
+    def set_factor(self, at: int, text: str) -> None:
+        """Set the roughness factor of a material to a number in JSON."""
         start = self._places[at].start
         if PBR in self.materials[at]:
             self.json.set_members(self.json.members(start)[PBR].start, {FACTOR: text})
@@ -152,29 +129,25 @@ class GltfDocument:
         if self._appended:
             length = self._binary_size + len(self._appended)
             self.json.set_members(self.array("buffers")[0].start, {"byteLength": str(length)})
+        for name, values in self._added.items():
+            self.json.append(self.json.root[name].start, values)
         text = self.json.changed().encode()
         if text == self._text:
             return self._data
         if not is_glb(self._data):
             return text
-        chunks: list[tuple[bytes, list[bytes | memoryview]]]
-        chunks = [(_JSON, [text, b" " * _padding(len(text))])]
-        chunks += [(kind, [content]) for kind, content in self._chunks]
+        chunks: list[tuple[bytes, bytes | memoryview]]
+        chunks = [(_JSON, text + b" " * _padding(len(text))), *self._chunks]
         if self._appended:
-            appended, binary = bytes(self._appended), chunks[1][1]
-            binary += [bytes(_padding(len(binary[0]))), appended, bytes(_padding(len(appended)))]
+            end = bytes(_padding(len(self._appended)))
+            binary = self._chunks[0][1].tobytes().ljust(self._binary_size, b"\0")
+            chunks[1] = _BINARY, b"".join([binary, self._appended, end])
         return _glb(chunks)
 
     @cached_property
     def everything(self) -> list[tuple[str, Any]]:
         """All members of all objects in the file."""
         return walk(self.json.value)
-
-    @cached_property
-    def other_texture_users(self) -> bool:
-        """Whether an extension of the whole file may use textures in a way of its own."""
-        keys = [key.lower() for key, _ in walk(self.json.value.get("extensions"))]
-        return any("texture" in key or "image" in key for key in keys)
 
 
 def walk(value: Any) -> list[tuple[str, Any]]:
@@ -223,19 +196,16 @@ def _pieces(data: bytes) -> tuple[bytes, list[tuple[bytes, memoryview]]]:
         raise MdfconvError("is a GLB whose first chunk is no JSON")
     text = bytes(chunks[0][1])
     # It is filled up by blanks, in some files by zeros.
-    end = len(text)
-    while end > max(0, len(text) - _ALIGNMENT + 1) and text[end - 1] in b" \0":
-        end -= 1
-    return text[:end], chunks[1:]
+    filled = 1 - _ALIGNMENT
+    return text[:filled] + text[filled:].rstrip(b" \0"), chunks[1:]
 
 
-def _glb(chunks: Sequence[tuple[bytes, Sequence[bytes | memoryview]]]) -> bytes:
-    """Return a GLB of chunks in pieces, which are not copied one by one."""
-    sizes = [sum(map(len, pieces)) for _, pieces in chunks]
-    total = _HEADER.size + sum(size + _CHUNK_HEAD.size for size in sizes)
+def _glb(chunks: Sequence[tuple[bytes, bytes | memoryview]]) -> bytes:
+    """Return a GLB of the types and contents of its chunks."""
+    total = _HEADER.size + sum(_CHUNK_HEAD.size + len(content) for _, content in chunks)
     if total > _LARGEST:
         raise MdfconvError("would no longer fit into a GLB, which ends at 4 GiB")
     parts: list[bytes | memoryview] = [_HEADER.pack(_MAGIC, _VERSION, total)]
-    for size, (kind, pieces) in zip(sizes, chunks, strict=True):
-        parts += [_CHUNK_HEAD.pack(size, kind), *pieces]
+    for kind, content in chunks:
+        parts += [_CHUNK_HEAD.pack(len(content), kind), content]
     return b"".join(parts)

@@ -67,8 +67,6 @@ class GltfImages:
         )
         self.files: dict[Path, bytes] = {}
         self._read: dict[Path, bytes] = {}
-        self._new_images: list[str] = []
-        self._new_views: list[str] = []
 
     def read(self, image: int) -> tuple[bytes, str]:
         """Return the content of an image and the suffix of its form."""
@@ -98,13 +96,7 @@ class GltfImages:
         """Add an image that is like another one but for its content; return its index."""
         copy = JsonText(self._document.json.text_of(self.images[image]))
         copy.set_members(0, *self._placed(image, content))
-        self._new_images.append(copy.changed())
-        return len(self.images) + len(self._new_images) - 1
-
-    def finish(self) -> None:
-        """Write what was added into the document."""
-        self._document.append("images", self._new_images)
-        self._document.append("bufferViews", self._new_views)
+        return self._document.append("images", copy.changed())
 
     @property
     def inputs(self) -> tuple[Path, ...]:
@@ -130,22 +122,19 @@ class GltfImages:
         """Store a PNG where an image is; return members to set, and new names of members."""
         entry = self.images[image].value
         if "uri" in entry:
-            inside = bool(_DATA.match(entry["uri"]))
-            return {"uri": self._stored(image, content, inside=inside)} | _kind(entry), {}
+            return {"uri": self._stored(image, content, entry["uri"])} | _kind(entry), {}
         if self._in_binary(entry):
             members = {"buffer": "0"} | self._append(content)
             pairs = ", ".join(f'"{name}": {value}' for name, value in members.items())
-            self._new_views.append(f"{{{pairs}}}")
-            view = len(self._views) + len(self._new_views) - 1
+            view = self._document.append("bufferViews", f"{{{pairs}}}")
             return {"bufferView": str(view)} | _kind(entry), {}
         buffer = self._buffers[int(self._views[int(entry["bufferView"])].value["buffer"])].value
-        inside = bool(_DATA.match(buffer["uri"]))
-        uri = self._stored(image, content, inside=inside)
+        uri = self._stored(image, content, buffer["uri"])
         return {"bufferView": uri} | _kind(entry), {"bufferView": "uri"}
 
-    def _stored(self, image: int, content: bytes, *, inside: bool) -> str:
-        """Return an address in JSON at which content is: within the file, or in a new one."""
-        if inside:
+    def _stored(self, image: int, content: bytes, former: str) -> str:
+        """Return an address in JSON of content: a data address if the former is, or a new file."""
+        if _DATA.match(former):
             return json.dumps(f"data:{_MIME};base64,{base64.b64encode(content).decode()}")
         entry = self.images[image].value
         stem = Path(unquote(entry["uri"])).stem if "uri" in entry else entry.get("name")

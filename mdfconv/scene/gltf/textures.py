@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
 from typing import Any
 
 from mdfconv.distributions.endpoint import Endpoint
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
 from mdfconv.scene.gltf.document import FACTOR, GltfDocument, walk
-from mdfconv.scene.gltf.images import GltfImages, GltfTextures, index_of, is_count
+from mdfconv.scene.gltf.images import GltfImages, GltfTextures, index_of
 from mdfconv.scene.gltf.json_edit import JsonText
 from mdfconv.scene.stored import ProblemKind
 from mdfconv.scene.texture.convert import convert_texture_bytes
@@ -19,16 +19,6 @@ from mdfconv.scene.texture.rule import TextureRule, ValueConverter
 
 _CHANNEL = "g"
 _OCCLUSION = "occlusionTexture"
-
-
-@dataclass
-class _Version:
-    """An image under one factor, and the materials that show it."""
-
-    image: int
-    factor: float
-    # From the places of the materials to the textures that they name.
-    textures: dict[int, int] = field(default_factory=dict)
 
 
 class TextureConversion:
@@ -52,19 +42,29 @@ class TextureConversion:
         self._document, self._lossy = document, folders.lossy
         self._pair, self._metric = (source, target), metric
         self._textures = document.array("textures")
-        self._new_textures: list[str] = []
         self._images = GltfImages(document, folders, target.label.replace(":", "-"))
         # By the places of materials what a careful user must know of those that were converted,
         # and why the others are left.
         self.notes: dict[int, tuple[str, ...]] = {}
         self.problems: dict[int, tuple[str, ProblemKind]] = {}
-        contents = [(version, self._content(version)) for version in self._versions(factors)]
-        self._write([(version, content) for version, content in contents if content])
+        versions = self._versions(factors)
+        contents = {version: self._content(*version, versions[version]) for version in versions}
+        converted = {version: content for version, content in contents.items() if content}
+        used = self._used_elsewhere()
+        counts = Counter(image for image, _ in converted)
+        for (image, factor), content in converted.items():
+            if image in used or counts[image] > 1:
+                self._add(image, content, versions[image, factor])
+            else:
+                self._images.replace(image, content)
         self.files, self.inputs = self._images.files, self._images.inputs
 
-    def _versions(self, factors: Mapping[int, float]) -> Collection[_Version]:
-        """Return the images that are to be converted."""
-        versions: dict[tuple[int, float], _Version] = {}
+    def _versions(self, factors: Mapping[int, float]) -> dict[tuple[int, float], dict[int, int]]:
+        """Return the images that are to be converted, with their factors.
+
+        Each has the places of the materials that show it, and the textures that they name.
+        """
+        versions: defaultdict[tuple[int, float], dict[int, int]] = defaultdict(dict)
         for at, factor in factors.items():
             try:
                 name = _index(self._document.texture_of(at))
@@ -73,9 +73,8 @@ class TextureConversion:
             except MdfconvError as error:
                 self.problems[at] = str(error), ProblemKind.OTHER
             else:
-                version = versions.setdefault((image, factor), _Version(image, factor))
-                version.textures[at] = texture
-        return versions.values()
+                versions[image, factor][at] = texture
+        return versions
 
     def _image(self, at: int) -> int:
         """Return which image a texture shows."""
@@ -86,55 +85,39 @@ class TextureConversion:
             )
         return index_of(texture.get("source"), self._images.images, "image")
 
-    def _content(self, version: _Version) -> bytes:
+    def _content(self, image: int, factor: float, materials: Collection[int]) -> bytes:
         """Return the converted content of an image, empty if it cannot be converted."""
-        source, target = self._pair
-        rule = TextureRule(source, target, metric=str(self._metric), factor=version.factor)
+        rule = TextureRule(*self._pair, metric=str(self._metric), factor=factor)
         try:
             if not ValueConverter(rule).takes_ends():
-                raise MdfconvError(
-                    f"{FACTOR} {version.factor:g} with its texture is mostly out of range"
-                )
-            content, suffix = self._images.read(version.image)
-            content, report = convert_texture_bytes(
-                content, suffix, rule, _CHANNEL, lossy=self._lossy
-            )
+                raise MdfconvError(f"{FACTOR} {factor:g} with its texture is mostly out of range")
+            former = self._images.read(image)
+            content, report = convert_texture_bytes(*former, rule, _CHANNEL, lossy=self._lossy)
         except MdfconvError as error:
             kind = ProblemKind.LOSSY if error.argument == "lossy" else ProblemKind.OTHER
-            problem = f"images[{version.image}]: {error}", kind
-            self.problems |= dict.fromkeys(version.textures, problem)
+            problem = f"images[{image}]: {error}", kind
+            self.problems |= dict.fromkeys(materials, problem)
             return b""
-        notes = f"with the texture of images[{version.image}]", *report.notes()
-        self.notes |= dict.fromkeys(version.textures, notes)
+        notes = f"with the texture of images[{image}]", *report.notes()
+        self.notes |= dict.fromkeys(materials, notes)
         return content
 
-    def _write(self, contents: Collection[tuple[_Version, bytes]]) -> None:
-        """Put converted images where their materials find them."""
-        used = self._used_elsewhere()
-        counts = Counter(version.image for version, _ in contents)
-        for version, content in contents:
-            if version.image in used or counts[version.image] > 1:
-                self._add(version, content)
-            else:
-                self._images.replace(version.image, content)
-        self._document.append("textures", self._new_textures)
-        self._images.finish()
-
-    def _add(self, version: _Version, content: bytes) -> None:
-        """Add an image, and textures of it for the materials that show it."""
-        image = self._images.add(version.image, content)
+    def _add(self, former: int, content: bytes, textures: Mapping[int, int]) -> None:
+        """Add an image, and textures of it for the materials that show it, by their places."""
+        image = self._images.add(former, content)
         added: dict[int, int] = {}
-        for texture in sorted(set(version.textures.values())):
+        for texture in sorted(set(textures.values())):
             copy = JsonText(self._document.json.text_of(self._textures[texture]))
             copy.set_members(0, {"source": str(image)})
-            added[texture] = len(self._textures) + len(self._new_textures)
-            self._new_textures.append(copy.changed())
-        for at, texture in version.textures.items():
+            added[texture] = self._document.append("textures", copy.changed())
+        for at, texture in textures.items():
             self._document.set_texture(at, added[texture])
 
     def _used_elsewhere(self) -> set[int]:
         """Return the images that are used for more than the roughness of converted materials."""
-        if self._document.other_texture_users:
+        # An extension of the whole file may use them in a way of its own.
+        extensions = walk(self._document.json.value.get("extensions"))
+        if any("texture" in key.lower() or "image" in key.lower() for key, _ in extensions):
             return set(range(len(self._images.images)))
         # The occlusion has another channel of the same image.
         free = {
@@ -143,18 +126,19 @@ class TextureConversion:
             if isinstance(material, dict)
         }
         free |= {id(self._document.texture_of(at)) for at in self.notes}
-        textures = [
-            _index(value)
-            for key, value in self._document.everything
-            if key.lower().endswith("texture") and isinstance(value, dict) and id(value) not in free
-        ]
-        entries = [
-            self._textures[int(at)].value
-            for at in textures
-            if is_count(at) and 0 <= at < len(self._textures)
-        ]
-        images: list[Any] = [entry.get("source") for entry in entries if isinstance(entry, dict)]
-        return {int(image) for image in images if is_count(image)}
+        images = set()
+        for key, value in self._document.everything:
+            if (
+                key.lower().endswith("texture")
+                and isinstance(value, dict)
+                and id(value) not in free
+            ):
+                # What names nothing uses nothing.
+                with suppress(MdfconvError):
+                    texture = index_of(_index(value), self._textures, "texture")
+                    source = self._textures[texture].value.get("source")
+                    images.add(index_of(source, self._images.images, "image"))
+        return images
 
 
 def _index(texture: Any) -> Any:

@@ -17,17 +17,7 @@ from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.solve import errors_of_many
 from mdfconv.scene.material_files import FileConversion
-from mdfconv.scene.mitsuba.scene import (
-    DEFAULT_ALPHA,
-    DEFAULT_DISTRIBUTION,
-    DISTRIBUTIONS,
-    PHONG_EXPONENT,
-    TARGETS,
-    Bsdf,
-    MitsubaScene,
-    bitmap_file,
-    leave_what_others_use,
-)
+from mdfconv.scene.mitsuba.scene import DISTRIBUTIONS, PHONG_EXPONENT, TARGETS, Bsdf, MitsubaScene
 from mdfconv.scene.mitsuba.xml_edit import Element, XmlEdits, attribute_text
 from mdfconv.scene.stored import ConvertedNumber, MaterialProblem, Outcome, StoredConverter
 
@@ -162,25 +152,23 @@ def convert_mitsuba(
     tables = {source: each.table() for source, each in numbers.items()}
     for bsdf in pending:
         bsdf.problem = _number_problem(bsdf, tables[bsdf.source], target)
-    leave_what_others_use(scene, pending)
+    scene.leave_what_others_use(pending)
     bitmaps = _convert_bitmaps(scene, pending, texture)
     # What shares something with a BSDF whose bitmap cannot be converted.
-    leave_what_others_use(scene, pending)
+    scene.leave_what_others_use(pending)
     edits = XmlEdits(data)
     materials: list[MitsubaMaterial] = []
     textures: dict[Element, MitsubaTexture] = {}
-    for bsdf in scene.bsdfs:
-        if bsdf.problem:
+    for bsdf in [bsdf for bsdf in scene.bsdfs if not bsdf.problem]:
+        # Those without a table have the target's distribution already.
+        table = tables[bsdf.source] if bsdf.distribution != target else None
+        materials.append(_material(bsdf, table))
+        if table is None:
             continue
-        if bsdf.distribution == target:
-            materials.append(_material(bsdf, None))
-            continue
-        materials.append(_material(bsdf, tables[bsdf.source]))
         _edit(edits, bsdf, target, _axes(materials[-1].result))
         for holder in bsdf.textures:
             textures[holder] = bitmaps[holder]
-            file = attribute_text(bitmaps[holder].result)
-            edits.set_value(bitmap_file(holder, scene.version), file)
+            edits.set_value(scene.bitmap_file(holder), attribute_text(bitmaps[holder].result))
     return MitsubaConversion(
         data=edits.result(),
         materials=tuple(materials),
@@ -229,10 +217,7 @@ def _numbers(
     groups: dict[str, set[float]] = {}
     for name, numbers in values:
         groups.setdefault(name, set()).update(x for x in numbers if not math.isnan(x))
-    return {
-        name: _Numbers(DISTRIBUTIONS.get(name, name), numbers, target, metric)
-        for name, numbers in groups.items()
-    }
+    return {name: _Numbers(name, numbers, target, metric) for name, numbers in groups.items()}
 
 
 class _Numbers:
@@ -242,7 +227,7 @@ class _Numbers:
     """
 
     def __init__(self, source: str, numbers: Iterable[float], target: str, metric: Metric) -> None:
-        self._source = endpoint(source)
+        self._source = endpoint(DISTRIBUTIONS.get(source, source))
         stored = np.array(sorted(numbers), dtype=np.float64)
         parameter = self._source.decode_legal(stored)
         legal = ~np.isnan(parameter)
@@ -268,26 +253,17 @@ class _Numbers:
 
 def _number_problem(bsdf: Bsdf, table: Mapping[float, ConvertedNumber], target: str) -> str:
     """Return why a number of a BSDF is not converted, "" if it is."""
-    if bsdf.source == PHONG_EXPONENT:
-        return _phong_problem(bsdf, table, target)
+    phong = bsdf.source == PHONG_EXPONENT
+    problem = "the BSDF phong has no microfacets" if phong else ""
     for value in bsdf.numbers:
         number = table.get(value)
-        if number is None or number.outcome is not Outcome.CONVERTED:
-            if value == 0:
-                why = "is a mirror"
-            else:
-                why = "is out of range" if number is None else f"has no answer in {target}"
-            return f"alpha {value:g} of {bsdf.distribution} {why}"
-    return ""
-
-
-def _phong_problem(bsdf: Bsdf, table: Mapping[float, ConvertedNumber], target: str) -> str:
-    problem = "the BSDF phong has no microfacets"
-    for exponent in bsdf.numbers:
-        number = table.get(exponent)
-        if number and number.outcome is Outcome.CONVERTED:
-            alpha = f"{number.result:.6g}"
-            problem += f"; exponent {exponent:g} is nearest to {target} with alpha {alpha}"
+        converted = number is not None and number.outcome is Outcome.CONVERTED
+        if phong and converted:
+            alpha = f"{table[value].result:.6g}"
+            problem += f"; exponent {value:g} is nearest to {target} with alpha {alpha}"
+        elif not phong and not converted:
+            why = f"has no answer in {target}" if number else "is out of range"
+            return f"alpha {value:g} of {bsdf.distribution} {why if value else 'is a mirror'}"
     return problem
 
 
@@ -296,22 +272,17 @@ def _convert_bitmaps(
 ) -> dict[Element, MitsubaTexture]:
     """Convert textures, by their elements; give a problem to BSDFs whose cannot be converted."""
     bitmaps: dict[Element, MitsubaTexture] = {}
-    for bsdf in pending:
-        if bsdf.problem:
-            continue
-        for holder in bsdf.textures:
-            if holder in bitmaps:
-                continue
-            try:
-                place = bitmap_file(holder, scene.version)
+    for bsdf in [bsdf for bsdf in pending if not bsdf.problem]:
+        try:
+            for holder in (each for each in bsdf.textures if each not in bitmaps):
+                place = scene.bitmap_file(holder)
                 file = place.attributes["value"]
                 if convert is None:
                     raise MdfconvError(f"alpha is the texture {file}")
                 name = convert(file, bsdf.source)
                 bitmaps[holder] = MitsubaTexture(file, name, bsdf.distribution, place.line)
-            except MdfconvError as error:
-                bsdf.problem = str(error)
-                break
+        except MdfconvError as error:
+            bsdf.problem = str(error)
     return bitmaps
 
 
@@ -327,15 +298,8 @@ def _material(bsdf: Bsdf, table: Mapping[float, ConvertedNumber] | None) -> Mits
         parameters = [each.parameter for each in bsdf.roughness if each.parameter]
         notes = [f"parameter {x}: convert what -D gives it, too" for x in parameters]
     notes += ["default α" for each in bsdf.roughness if each.holder is None]
-    return MitsubaMaterial(
-        bsdf.name,
-        bsdf.element.line,
-        bsdf.distribution,
-        _value(values),
-        _value(results),
-        rmse,
-        tuple(dict.fromkeys(notes)),
-    )
+    place, pair = (bsdf.name, bsdf.element.line), (_value(values), _value(results))
+    return MitsubaMaterial(*place, bsdf.distribution, *pair, rmse, tuple(dict.fromkeys(notes)))
 
 
 def _edit(edits: XmlEdits, bsdf: Bsdf, target: str, results: Sequence[float]) -> None:
@@ -343,12 +307,13 @@ def _edit(edits: XmlEdits, bsdf: Bsdf, target: str, results: Sequence[float]) ->
     new: list[tuple[str, str, str]] = []
     if bsdf.named_by is not None:
         edits.set_value(bsdf.named_by, target.encode())
-    elif target != DEFAULT_DISTRIBUTION:
+    else:  # it is the default, and not the target
         new.append(("string", "distribution", target))
     for each, result in zip(bsdf.roughness, results, strict=True):
         number = f"{result:.{_DIGITS}g}"
         if each.holder is None:
-            if result != DEFAULT_ALPHA:
+            # The default, which the target has, too.
+            if result != each.value:
                 new.append(("float", "alpha", number))
         elif not each.textured:
             edits.set_value(each.holder, number.encode())

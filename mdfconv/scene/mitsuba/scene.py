@@ -19,21 +19,18 @@ from mdfconv.scene.mitsuba.xml_edit import Element, read_elements
 _EXPONENT = "blinn-phong:mitsuba-phong"
 DISTRIBUTIONS = {"beckmann": "beckmann", "ggx": "ggx", "phong": _EXPONENT, "as": _EXPONENT}
 TARGETS = ("ggx", "beckmann")
-DEFAULT_DISTRIBUTION, DEFAULT_ALPHA = "beckmann", 0.1
+_DEFAULT_DISTRIBUTION, _DEFAULT_ALPHA = "beckmann", 0.1
 # The plugin phong of 0.6, which has no microfacets: the exponent is of the reflected ray.
 PHONG, PHONG_EXPONENT, _DEFAULT_EXPONENT = "phong", "blinn-phong:reflected", 30.0
 
 _TYPES = {"roughconductor", "roughdielectric", "roughplastic", "roughcoating", PHONG}
 _AXES = ("alpha_u", "alpha_v")
 # By the names of 0.6, too, which Mitsuba 3 reads in older scenes.
-_PROPERTIES = {name: name for name in ("distribution", "alpha", *_AXES)} | {
-    "alphaU": "alpha_u",
-    "alphaV": "alpha_v",
-}
+_PROPERTIES = {"alphaU": "alpha_u", "alphaV": "alpha_v"}
+_PROPERTIES |= {name: name for name in ("distribution", "alpha", *_AXES)}
 _ALPHAS: tuple[set[str], ...] = (set(), {"alpha"}, set(_AXES))
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\Z")
-_PARAMETER = re.compile(r"\$(\w+)\Z")
-_USED = re.compile(r"\$(\w+)")
+_PARAMETER = re.compile(r"\$(\w+)")
 
 
 @dataclass(eq=False)
@@ -58,11 +55,6 @@ class Roughness:
     parameter: str = ""
     textured: bool = False
 
-    @property
-    def shared(self) -> bool:
-        """Whether others may use the holder, too."""
-        return self.textured or bool(self.parameter)
-
 
 @dataclass(eq=False)
 class Bsdf:
@@ -83,7 +75,7 @@ class Bsdf:
     """
 
     element: Element
-    distribution: str = DEFAULT_DISTRIBUTION
+    distribution: str = _DEFAULT_DISTRIBUTION
     named_by: Element | None = None
     roughness: tuple[Roughness, ...] = ()
     problem: str = ""
@@ -178,7 +170,7 @@ class MitsubaScene:
                 raise MdfconvError(f"{names}: neither alpha alone nor alpha_u and alpha_v")
             bsdf.roughness = tuple([self._roughness(alphas[name]) for name in sorted(alphas)])
             if not alphas:
-                bsdf.roughness = (Roughness(DEFAULT_ALPHA),)
+                bsdf.roughness = (Roughness(_DEFAULT_ALPHA),)
         except MdfconvError as refusal:
             bsdf.problem = str(refusal)
         return bsdf
@@ -219,7 +211,7 @@ class MitsubaScene:
             raise MdfconvError(f"{name} is a {element.tag}, not a float")
         if "$" not in value:
             return Roughness(_number(name, value), element)
-        parameter = _PARAMETER.match(value.strip())
+        parameter = _PARAMETER.fullmatch(value.strip())
         if not parameter:
             raise MdfconvError(f"{name} '{value}' is not a number")
         default = self._defaults.get(parameter[1])
@@ -229,6 +221,71 @@ class MitsubaScene:
             )
         number = _number(f"the default of {parameter[1]},", default.get("value"))
         return Roughness(number, default, parameter[1])
+
+    def bitmap_file(self, texture: Element) -> Element:
+        """Return the property that names the file of a texture whose texels are the α themselves.
+
+        Mitsuba takes 8 and 16 bits for sRGB unless ``raw`` is true (0.6: ``gamma`` is 1); OpenEXR
+        is linear.
+
+        Raises
+        ------
+        MdfconvError
+            If it is not such a texture.
+        """
+        kind = texture.attributes.get("type")
+        if kind != "bitmap":
+            raise MdfconvError(f"alpha is a texture of type {kind}, and only bitmaps are converted")
+        properties = {child.get("name"): child for child in texture.children}
+        file = properties.get("filename")
+        name = file.get("value") if file else ""
+        if file is None or not name or "$" in name:
+            raise MdfconvError("alpha is a bitmap without a filename, or with one of a parameter")
+        values = {key: child.get("value").strip().lower() for key, child in properties.items()}
+        gamma = values.get("gamma", "")
+        raw = values.get("raw") == "true" and self.version != 0
+        linear = _NUMBER.match(gamma) and float(gamma) == 1 and self.version in (0, None)
+        if not (raw or linear or name.lower().endswith(".exr")):
+            setting = 'gamma="1"' if self.version == 0 else 'raw="true"'
+            raise MdfconvError(
+                f"Mitsuba takes {name} for sRGB, as it is without {setting}: add that if it holds "
+                "alpha"
+            )
+        return file
+
+    def leave_what_others_use(self, pending: Sequence[Bsdf]) -> None:
+        """Give a problem to BSDFs whose default or texture cannot be changed for all that use it.
+
+        Those that are to be converted may be left for another reason, and have a problem already.
+        """
+        users: dict[Element, list[tuple[Bsdf, Roughness]]] = {}
+        for bsdf in pending:
+            for roughness in () if bsdf.problem else bsdf.roughness:
+                if roughness.holder is not None and (roughness.textured or roughness.parameter):
+                    users.setdefault(roughness.holder, []).append((bsdf, roughness))
+        unsettled = [holder for holder, group in users.items() if self._others_use(holder, group)]
+        while unsettled:
+            for bsdf, roughness in users.pop(unsettled.pop(), []):
+                if not bsdf.problem:
+                    bsdf.problem = self._shared_problem(roughness)
+                    unsettled += [each.holder for each in bsdf.roughness if each.holder is not None]
+
+    def _others_use(self, holder: Element, users: list[tuple[Bsdf, Roughness]]) -> bool:
+        """Return whether what is shared may be more than the α of BSDFs that convert alike."""
+        nameless = holder.tag == "texture" and "id" not in holder.attributes
+        return (
+            len(users) != self.uses[holder]
+            or len({bsdf.source for bsdf, _ in users}) > 1
+            or (bool(self.includes) and not nameless)
+        )
+
+    def _shared_problem(self, roughness: Roughness) -> str:
+        assert roughness.holder is not None
+        name = roughness.parameter or roughness.holder.get("id")
+        what = f"the {'parameter' if roughness.parameter else 'texture'} {name}"
+        if self.includes:
+            return f"alpha is {what}, which an included file may use, too"
+        return f"alpha is {what}, which is not only that of BSDFs converted alike"
 
 
 def _textures_that_are_properties(elements: list[Element]) -> Iterator[Element]:
@@ -242,7 +299,7 @@ def _parameters_used(elements: list[Element]) -> Iterator[str]:
     for element in elements:
         for value in element.attributes.values():
             if "$" in value:
-                yield from _USED.findall(value)
+                yield from _PARAMETER.findall(value)
 
 
 def _properties(bsdf: Element) -> dict[str, Element]:
@@ -261,72 +318,3 @@ def _number(name: str, text: str) -> float:
     if not _NUMBER.match(text.strip()):
         raise MdfconvError(f"{name} '{text}' is not a number")
     return float(text)
-
-
-def bitmap_file(texture: Element, version: int | None) -> Element:
-    """Return the property that names the file of a texture whose texels are the α themselves.
-
-    Mitsuba takes 8 and 16 bits for sRGB unless ``raw`` is true (0.6: ``gamma`` is 1); OpenEXR is
-    linear.
-
-    Raises
-    ------
-    MdfconvError
-        If it is not such a texture.
-    """
-    kind = texture.attributes.get("type")
-    if kind != "bitmap":
-        raise MdfconvError(f"alpha is a texture of type {kind}, and only bitmaps are converted")
-    properties = {child.get("name"): child for child in texture.children}
-    file = properties.get("filename")
-    name = file.get("value") if file else ""
-    if file is None or not name or "$" in name:
-        raise MdfconvError("alpha is a bitmap without a filename, or with one of a parameter")
-    values = {key: child.get("value").strip().lower() for key, child in properties.items()}
-    gamma = values.get("gamma", "")
-    raw = values.get("raw") == "true" and version != 0
-    linear = _NUMBER.match(gamma) and float(gamma) == 1 and version in (0, None)
-    if not (raw or linear or name.lower().endswith(".exr")):
-        setting = 'gamma="1"' if version == 0 else 'raw="true"'
-        raise MdfconvError(
-            f"Mitsuba takes {name} for sRGB, as it is without {setting}: add that if it holds alpha"
-        )
-    return file
-
-
-def leave_what_others_use(scene: MitsubaScene, pending: Sequence[Bsdf]) -> None:
-    """Give a problem to BSDFs whose default or texture cannot be changed for all that use it.
-
-    Those that are to be converted may be left for another reason, and have a problem already.
-    """
-    users: dict[Element, list[tuple[Bsdf, Roughness]]] = {}
-    for bsdf in pending:
-        if not bsdf.problem:
-            for roughness in bsdf.roughness:
-                if roughness.shared and roughness.holder is not None:
-                    users.setdefault(roughness.holder, []).append((bsdf, roughness))
-    unsettled = [holder for holder, group in users.items() if _others_use(scene, holder, group)]
-    while unsettled:
-        for bsdf, roughness in users.pop(unsettled.pop(), []):
-            if not bsdf.problem:
-                bsdf.problem = _shared_problem(scene, roughness)
-                unsettled += [each.holder for each in bsdf.roughness if each.holder is not None]
-
-
-def _others_use(scene: MitsubaScene, holder: Element, users: list[tuple[Bsdf, Roughness]]) -> bool:
-    """Return whether what is shared may be more than the α of BSDFs that convert alike."""
-    nameless = holder.tag == "texture" and "id" not in holder.attributes
-    return (
-        len(users) != scene.uses[holder]
-        or len({bsdf.source for bsdf, _ in users}) > 1
-        or (bool(scene.includes) and not nameless)
-    )
-
-
-def _shared_problem(scene: MitsubaScene, roughness: Roughness) -> str:
-    assert roughness.holder is not None
-    name = roughness.parameter or roughness.holder.get("id")
-    what = f"the {'parameter' if roughness.parameter else 'texture'} {name}"
-    if scene.includes:
-        return f"alpha is {what}, which an included file may use, too"
-    return f"alpha is {what}, which is not only that of BSDFs converted alike"

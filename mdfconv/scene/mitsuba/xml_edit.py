@@ -13,6 +13,7 @@ from xml.parsers import expat
 from xml.sax.saxutils import escape
 
 from mdfconv.errors import MdfconvError
+from mdfconv.scene.material_files import spliced
 
 # No scene is nested so deeply.
 DEEPEST = 1000
@@ -120,17 +121,12 @@ class XmlEdits:
 
     def __init__(self, data: bytes) -> None:
         self._data = data
-        # From where a piece starts to where it ends, and what takes its place.
-        self._edits: dict[int, tuple[int, bytes]] = {}
+        # By where a piece starts: that, where it ends, and what takes its place.
+        self._edits: dict[int, tuple[int, int, bytes]] = {}
 
     def result(self) -> bytes:
         """Return the changed file."""
-        pieces: list[bytes] = []
-        position = 0
-        for start, (end, new) in sorted(self._edits.items()):
-            pieces += (self._data[position:start], new)
-            position = end
-        return b"".join([*pieces, self._data[position:]])
+        return spliced(self._data, self._edits.values())
 
     def set_value(self, element: Element, text: bytes) -> None:
         """Change the attribute ``value``, which an element has; the blanks around it are kept."""
@@ -139,7 +135,7 @@ class XmlEdits:
         start, end = match.span(match.lastindex or 1)
         old = self._data[start:end]
         start, end = start + len(old) - len(old.lstrip()), end - len(old) + len(old.rstrip())
-        self._edits[start] = end, text
+        self._edits[start] = start, end, text
 
     def add_properties(self, element: Element, properties: list[tuple[str, str, str]]) -> None:
         """Put properties, of a tag, a name and a value, before the children of an element.
@@ -148,9 +144,9 @@ class XmlEdits:
         have its quotes.
         """
         tag = self._start_tag(element)
-        ending = b"/>"
+        ending, closing = b"/>", b""
         if element.children:
-            gap, closing = self._blanks_before(element.children[0].start), b""
+            gap = self._blanks_before(element.children[0].start)
             first = self._start_tag(element.children[0])
             ending = first[1] if first[2] else ending
         else:
@@ -170,7 +166,7 @@ class XmlEdits:
             inner = b">" + inner + b"</" + element.tag.encode() + b">"
         else:
             start = end = tag.end()
-        self._edits[start] = end, inner
+        self._edits[start] = start, end, inner
 
     def _start_tag(self, element: Element) -> re.Match[bytes]:
         match = _START_TAG.match(self._data, element.start)

@@ -12,14 +12,8 @@ import numpy as np
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.material_files import FileConversion, TextureFolder
-from mdfconv.scene.mtl.statements import (
-    Line,
-    MaterialBlock,
-    named_files,
-    number,
-    read_library,
-    split_options,
-)
+from mdfconv.scene.mtl import statements
+from mdfconv.scene.mtl.statements import Line, MaterialBlock
 from mdfconv.scene.shininess import ROUGHNESS, SHININESS, exponent_of, fit_error, roughness_of
 from mdfconv.scene.stored import MaterialProblem, ProblemKind
 from mdfconv.scene.texture.convert import Progress
@@ -155,19 +149,18 @@ def convert_mtl(
     if to not in list(To):
         raise MdfconvError(f"a library is converted to roughness or shininess, not to '{to}'")
     source, target = _KEYWORDS[To(to)]
-    lines, blocks = read_library(data)
-    if not any(line.keyword for line in lines) and any(map(_says_something, lines)):
+    lines, blocks = statements.read_library(data)
+    # What has no such statement may be blank or of comments.
+    says_something = any(line.before.partition(b"#")[0].strip() for line in lines)
+    if says_something and not any(line.keyword for line in lines):
         raise MdfconvError("is no material library: it has neither newmtl nor Ns nor Pr")
     sources, problems = _sources(blocks, source)
     materials = _converted(sources, to, metric_named(metric))
-    # For a last line that nothing ends.
-    usual_end = next((line.end for line in lines if line.end), b"\n")
     for each, material in zip(sources, materials, strict=True):
         result = material.roughness if target == b"Pr" else material.shininess
         if not np.isnan(result):
             value = f"{result:.{_DIGITS[target]}g}".encode()
-            targets = each.block.having(target)
-            _set(target, value, each.lines, targets, usual_end, replace=replace)
+            _set(target, value, each.lines, each.block.having(target), replace=replace)
     textures = _textures(blocks, b"map_" + source)
     for block, line, texture in textures:
         if texture_names is None:
@@ -175,10 +168,10 @@ def convert_mtl(
             text = f"{texture.keyword} {texture.file} is a texture"
             problems.append(MaterialProblem(line.number, text, kind))
         elif texture.file in texture_names:
-            options, _ = split_options(line.value)
+            options, _ = statements.split_options(line.value)
             value = options + texture_names[texture.file].encode(errors="surrogateescape")
             targets = block.having(b"map_" + target)[-1:]
-            _set(b"map_" + target, value, [line], targets, usual_end, replace=replace)
+            _set(b"map_" + target, value, [line], targets, replace=replace)
     return MtlConversion(
         data=b"".join([line.result for line in lines]),
         notes=tuple(
@@ -188,14 +181,9 @@ def convert_mtl(
         ),
         materials=tuple(materials),
         textures=tuple(texture for *_, texture in textures),
-        named=named_files(lines),
+        named=statements.named_files(lines),
         problems=tuple(problems),
     )
-
-
-def _says_something(line: Line) -> bool:
-    """Return whether a line without a statement that matters is more than blank or a comment."""
-    return bool(line.before.partition(b"#")[0].strip())
 
 
 def _sources(
@@ -207,7 +195,7 @@ def _sources(
         numbers: list[tuple[Line, float]] = []
         for line in block.having(keyword):
             try:
-                numbers.append((line, number(line)))
+                numbers.append((line, statements.number(line)))
             except MdfconvError as error:
                 problems.append(MaterialProblem(line.number, str(error)))
         if numbers:
@@ -231,27 +219,19 @@ def _converted(sources: Sequence[_SourceLines], to: str, metric: Metric) -> list
 
 
 def _material(source: _SourceLines, shininess: float, roughness: float, rmse: float) -> MtlMaterial:
-    notes = []
-    if shininess == 0:
-        notes.append("Ns 0 is no highlight: Pr 1")
-    if shininess > _LARGEST_USUAL:
-        notes.append("Ns beyond 10000")
-    if roughness == 0:
-        notes.append("Pr 0 is a mirror, which has no exponent: nothing written")
-    if len(source.lines) > 1:
-        notes.append(f"{len(source.lines)} statements: the last counts")
+    remarks = {
+        "Ns 0 is no highlight: Pr 1": shininess == 0,
+        "Ns beyond 10000": shininess > _LARGEST_USUAL,
+        "Pr 0 is a mirror, which has no exponent: nothing written": roughness == 0,
+        f"{len(source.lines)} statements: the last counts": len(source.lines) > 1,
+    }
+    notes = tuple(text for text, holds in remarks.items() if holds)
     line = source.lines[-1].number
-    return MtlMaterial(source.block.name, line, shininess, roughness, rmse, tuple(notes))
+    return MtlMaterial(source.block.name, line, shininess, roughness, rmse, notes)
 
 
 def _set(
-    keyword: bytes,
-    value: bytes,
-    sources: Sequence[Line],
-    targets: Sequence[Line],
-    usual_end: bytes,
-    *,
-    replace: bool,
+    keyword: bytes, value: bytes, sources: list[Line], targets: list[Line], *, replace: bool
 ) -> None:
     """Give the targets a value; without any, put a line behind the last source, or in its place."""
     last = sources[-1]
@@ -260,10 +240,8 @@ def _set(
     if replace:
         for line in sources:
             line.replacement = b""
-    if not targets and replace:
-        last.replacement = last.with_value(keyword, value)
-    elif not targets:
-        last.replacement = last.and_another(keyword, value, usual_end)
+    if not targets:
+        last.replacement = (last.with_value if replace else last.and_another)(keyword, value)
 
 
 def _textures(
@@ -274,7 +252,7 @@ def _textures(
     for block in blocks:
         for line in block.having(keyword):
             if line.value:
-                file = split_options(line.value)[1].decode(errors="surrogateescape")
+                file = statements.split_options(line.value)[1].decode(errors="surrogateescape")
                 statement = TextureStatement(block.name, keyword.decode(), file, line.number)
                 textures.append((block, line, statement))
     return textures
@@ -308,7 +286,7 @@ def convert_library_textures(
     """
     names: dict[str, str] = {}
     problems: list[MaterialProblem] = []
-    textures = _textures(read_library(data)[1], b"map_Ns")
+    textures = _textures(statements.read_library(data)[1], b"map_Ns")
     with progress("Textures", len(textures)) as advance:
         for _, line, texture in textures:
             try:

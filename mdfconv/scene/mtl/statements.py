@@ -11,8 +11,6 @@ from mdfconv.errors import MdfconvError
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _BLANKS = b" \t"
-# A line and what ends it.
-_LINE = re.compile(rb"([^\r\n]*)(\r\n|\n|\r|\Z)")
 # Indentation, keyword, blanks, value, and blanks with a comment. Blanks are taken all or none, so
 # that a long line takes no long time.
 _STATEMENT = re.compile(
@@ -36,8 +34,8 @@ class Line:
     before, keyword, gap, value, after : bytes
         The line: indentation, keyword, blanks, value, and blanks with a comment. Of any other
         line all is in `before`.
-    end : bytes
-        What ends it; nothing at the end of the library.
+    end, usual_end : bytes
+        What ends it, nothing at the end of the library; and what would if a line were to follow.
     number : int
         Counted from 1.
     replacement : bytes or None
@@ -50,6 +48,7 @@ class Line:
     value: bytes
     after: bytes
     end: bytes
+    usual_end: bytes
     number: int
     replacement: bytes | None = None
 
@@ -81,11 +80,11 @@ class Line:
         comment = self.after and (self.gap or b" ") + self.after
         return self.before + keyword + b" " + value + comment + self.end
 
-    def and_another(self, keyword: bytes, value: bytes, default_end: bytes) -> bytes:
+    def and_another(self, keyword: bytes, value: bytes) -> bytes:
         """Return the line and a new one like it: of its indentation, without its comment."""
         indentation = self.before.removeprefix(_BYTE_ORDER_MARK)
         new = indentation + keyword + self.gap + value
-        return self.content + (self.end or default_end) + new + self.end
+        return self.content + self.usual_end + new + self.end
 
 
 @dataclass(slots=True, eq=False)
@@ -112,15 +111,16 @@ def read_library(data: bytes) -> tuple[list[Line], list[MaterialBlock]]:
     """Return the lines of a library and its materials, the first for what is before them."""
     lines: list[Line] = []
     blocks = [MaterialBlock("")]
-    for number, match in enumerate(_LINE.finditer(data), start=1):
-        content, end = match.groups()
-        if not (content or end):
-            break
+    for number, whole in enumerate(data.splitlines(keepends=True), start=1):
+        content = whole.rstrip(b"\r\n")
+        end = whole[len(content) :]
         statement = _STATEMENT.match(content)
         before, keyword, gap, value, after = (
             statement.groups() if statement else (content, b"", b"", b"", b"")
         )
-        line = Line(before, keyword, gap, value, after, end, number)
+        # For a last line that nothing ends: that of the first.
+        usual_end = lines[0].end if lines else b"\n"
+        line = Line(before, keyword, gap, value, after, end, end or usual_end, number)
         lines.append(line)
         if keyword == b"newmtl":
             blocks.append(MaterialBlock(value.decode(errors="replace")))

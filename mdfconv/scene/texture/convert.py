@@ -15,16 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mdfconv.errors import MdfconvError, MdfconvWarning
 from mdfconv.output.files import staged_files
-from mdfconv.scene.texture.images import (
-    EXR,
-    TIFF,
-    PictureFile,
-    check_files,
-    check_output,
-    find_channels,
-    open_picture,
-    written,
-)
+from mdfconv.scene.texture import images
+from mdfconv.scene.texture.images import PictureFile
 from mdfconv.scene.texture.rule import TextureRule, ValueConverter
 from mdfconv.scene.texture.texel_map import BLOCK, TexelMap, TextureReport
 
@@ -79,7 +71,7 @@ def convert_texture(
     convert = TexelMap(rule, texels.dtype, depth, texels.shape[1] if dither else None)
     converted = np.empty(texels.shape, convert.dtype)
     rows, results = (each if dither else each.reshape(-1, 1) for each in (texels, converted))
-    step = _rows_a_block(rows.shape[1])
+    step = max(1, BLOCK // max(1, rows.shape[1]))
     for start in range(0, len(rows), step):
         results[start : start + step] = convert(rows[start : start + step])
     for note in convert.report().notes(limits=False)[:1]:
@@ -146,22 +138,20 @@ def convert_texture_file(
         for each in (source, output)
     )
     ValueConverter(rule)  # names are wrong more often than files
-    source_form, form = check_files(source, output, lossy=lossy)
+    source_form, form = images.check_files(source, output, lossy=lossy)
     with (
         nullcontext(fill) if fill else _staged() as place,
-        open_picture(
-            source, source_form, lossy=lossy, max_pixels=max_pixels, upright=form not in (TIFF, EXR)
+        images.open_picture(
+            source, source_form, lossy=lossy, max_pixels=max_pixels, upright=bool(form.bands)
         ) as picture,
     ):
-        channels = find_channels(picture, channel)
-        width = picture.width if dither else None
-        dtype = picture.dtype_of(channels)
+        channels = images.find_channels(picture, channel)
+        width, dtype = picture.width if dither else None, picture.dtype_of(channels)
         convert = TexelMap(rule, dtype, depth, width, channels=len(channels))
-        check_output(picture, form, convert.dtype)
-        with (
-            written(place(output.path), form, picture, convert.dtype) as write,
-            progress("rows", picture.height) if progress else nullcontext(_ignore) as advance,
-        ):
+        images.check_output(picture, form, convert.dtype)
+        rows = progress("rows", picture.height) if progress else nullcontext(lambda _: None)
+        written = images.written(place(output.path), form, picture, convert.dtype)
+        with written as write, rows as advance:
             for block in picture.blocks(BLOCK):
                 write(_converted(block, channels, convert))
                 advance(len(block))
@@ -192,14 +182,6 @@ def _rescaled(block: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
     if dtype == np.uint16:
         return block * np.uint16(257)
     return np.rint(block / np.float32(257)).astype(np.uint8)
-
-
-def _rows_a_block(width: int) -> int:
-    return max(1, BLOCK // max(1, width))
-
-
-def _ignore(rows: int) -> None:
-    pass
 
 
 def convert_texture_bytes(

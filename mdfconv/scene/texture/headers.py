@@ -149,9 +149,8 @@ def _lacks(tags: dict[int, tuple[int, ...]], bits: int, size: int) -> bool:
     starts, lengths = (tags.get(tag, ()) for tag in _PLACES[tiled])
     if not len(starts) == len(lengths) == down * ceil(width / across) * planes:
         return True
-    if any(
-        not length or start + length > size for start, length in zip(starts, lengths, strict=True)
-    ):
+    ends = [start + length for start, length in zip(starts, lengths, strict=True)]
+    if not all(lengths) or max(ends, default=0) > size:
         return True
     if tags.get(_COMPRESSION, (_UNCOMPRESSED,)) != (_UNCOMPRESSED,):
         return False  # what decodes them will say

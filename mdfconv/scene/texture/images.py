@@ -7,7 +7,7 @@ import struct
 import sys
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,37 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdfconv.errors import MdfconvError
-from mdfconv.scene.texture.headers import (
-    PALETTE,
-    SEVERAL_PICTURES,
-    PngHeader,
-    Reason,
-    check_tga,
-    png_chunk,
-    replace_chunks,
-    tga_reason,
-    tiff_reason,
-)
+from mdfconv.scene.texture import headers
+from mdfconv.scene.texture.headers import PngHeader, Reason
 
 
 @contextmanager
 def quiet_streams() -> Iterator[None]:
     """Keep libpng and OpenEXR from the process's streams; it holds for the whole process."""
-    streams = {1: sys.stdout, 2: sys.stderr}
-    for stream in streams.values():
-        if stream is not None:
-            stream.flush()
-    copies = [(number, os.dup(number)) for number, stream in streams.items() if stream is not None]
-    null = os.open(os.devnull, os.O_WRONLY)
-    try:
-        for number, _ in copies:
-            os.dup2(null, number)
+    with open(os.devnull, "wb") as null, ExitStack() as restore:
+        for number, stream in ((1, sys.stdout), (2, sys.stderr)):
+            if stream is not None:
+                stream.flush()
+                copy = os.dup(number)
+                restore.callback(os.close, copy)
+                restore.callback(os.dup2, copy, number)
+                os.dup2(null.fileno(), number)
         yield
-    finally:
-        for number, copy in copies:
-            os.dup2(copy, number)
-            os.close(copy)
-        os.close(null)
 
 
 _GREY = ("y", "l", "grey", "gray")
@@ -103,13 +88,8 @@ _TURNS = {
     number: (number > 4, number in (2, 3, 6, 7), number in (3, 4, 7, 8)) for number in range(2, 9)
 }
 # OpenImageIO's names of types.
-_DTYPES = {
-    "uint8": "uint8",
-    "uint16": "uint16",
-    "half": "float16",
-    "float": "float32",
-    "double": "float64",
-}
+_FLOATS = {"half": "float16", "float": "float32", "double": "float64"}
+_DTYPES = {"uint8": "uint8", "uint16": "uint16"} | _FLOATS
 _NAMES = {dtype: name for name, dtype in _DTYPES.items()}
 # Of the attributes of a picture those that are about its texels; the writer of TIFF makes the
 # vertical resolution from the horizontal one and the aspect.
@@ -126,7 +106,7 @@ class PictureForm:
     endings: tuple[str, ...]
     # What files of it start with; none if there is nothing to tell them by.
     signatures: tuple[bytes, ...] = ()
-    # The channels that it holds; none if it holds any.
+    # The channels that it holds; none if it holds any, and keeps a picture's orientation, too.
     bands: tuple[str, ...] = ()
     # Why a file of it is no texture, if it is none.
     reason: Callable[[Path], Reason | None] = lambda _: None
@@ -141,9 +121,9 @@ PNG = PictureForm(
 )
 TIFF = PictureForm(
     *("TIFF", "tiff", (".tif", ".tiff"), (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")),
-    reason=tiff_reason,
+    reason=headers.tiff_reason,
 )
-TGA = PictureForm("TGA", "targa", (".tga",), (), ("Y", "RGB", "RGBA"), tga_reason)
+TGA = PictureForm("TGA", "targa", (".tga",), (), ("Y", "RGB", "RGBA"), headers.tga_reason)
 EXR = PictureForm("OpenEXR", "openexr", (".exr",), (b"\x76\x2f\x31\x01",))
 JPEG = PictureForm("JPEG", "jpeg", (".jpg", ".jpeg"), (b"\xff\xd8\xff",))
 _FORMS = (PNG, TIFF, TGA, EXR, JPEG)
@@ -263,29 +243,24 @@ class Picture:
             yield self._read(top, min(top + step, self.height))
 
     def _read(self, top: int, bottom: int) -> NDArray[Any]:
-        spec, kind = self.spec, self._kind
-        block = self._decode(top, bottom, 0, spec.nchannels, kind)
-        if kind == "float":
-            for channel in (at for at, name in enumerate(self.kinds) if name == "uint"):
-                integers = self._decode(top, bottom, channel, channel + 1, "uint")
+        for channel, kind in enumerate(self.kinds):
+            if self._kind == "float" and kind == "uint":
+                integers = self._decode(top, bottom, channel, channel + 1, kind)
                 if integers.max() >= _LARGEST_MIXED:
                     raise MdfconvError(
                         f"{self.source} has floats and, in channel {self.names[channel]}, integers "
                         f"above {_LARGEST_MIXED}, which would lose digits",
                         "split it",
                     )
-        return block
+        return self._decode(top, bottom, 0, self.spec.nchannels, self._kind)
 
     def _decode(self, top: int, bottom: int, first: int, last: int, kind: str) -> NDArray[Any]:
         """Return some rows of the channels from `first` on and before `last`."""
         spec = self.spec
-        rows = spec.y + top, spec.y + bottom
+        columns, depth = _beyond_rows(spec)
+        read = self._file.read_tiles if spec.tile_width else self._file.read_scanlines
         with reading(self.source):
-            if spec.tile_width:
-                columns = spec.x, spec.x + spec.width
-                texels = self._file.read_tiles(*columns, *rows, 0, 1, first, last, kind)
-            else:
-                texels = self._file.read_scanlines(*rows, 0, first, last, kind)
+            texels = read(*columns, spec.y + top, spec.y + bottom, *depth, first, last, kind)
             fault = self._file.geterror()
             if texels is None or fault:
                 raise ValueError(fault)
@@ -325,18 +300,16 @@ def open_picture(
         fault = OpenImageIO.geterror()
         if file is None or file.format_name() != form.library:
             raise ValueError(fault)
-    try:
+    with closing(file):
         with reading(source):
             picture = Picture(source, form, file, upright=upright)
-            _check_size(picture, max_pixels)
+            _check_size(picture, MAX_PIXELS if max_pixels is None else max_pixels)
             _refuse(source, _reason(picture, lossy=lossy))
             if file.seek_subimage(1, 0) or file.seek_subimage(0, 1):
-                _refuse(source, SEVERAL_PICTURES)
+                _refuse(source, headers.SEVERAL_PICTURES)
             file.seek_subimage(0, 0)
             file.geterror()
         yield picture
-    finally:
-        file.close()
 
 
 def _refuse(source: PictureFile, reason: Reason | None) -> None:
@@ -347,11 +320,11 @@ def _refuse(source: PictureFile, reason: Reason | None) -> None:
 def _reason(picture: Picture, *, lossy: bool) -> Reason | None:
     """Return why an open picture cannot be taken, and what helps; None if it can."""
     spec = picture.spec
-    space = spec.get_string_attribute("tiff:ColorSpace")
     if spec.deep:
         return "holds deep texels, which are no texture", ""
+    space = spec.get_string_attribute("tiff:ColorSpace")
     if space == "palette":
-        return PALETTE
+        return headers.PALETTE
     if space:
         return f"holds {space} colours, not grey or RGB(A)", ""
     if picture.form is not EXR and picture.kinds[0] not in _DTYPES:
@@ -369,16 +342,20 @@ def _is_lossless(spec: Any) -> bool:
     return spec.get_string_attribute("compression") in _LOSSLESS
 
 
-def _check_size(picture: Picture, max_pixels: int | None) -> None:
-    limit = MAX_PIXELS if max_pixels is None else max_pixels
+def _check_size(picture: Picture, limit: int) -> None:
     width, height = picture.width, picture.height
-    if width * height > limit:
+    if (pixels := width * height) > limit:
         raise MdfconvError(
-            f"{picture.source} has {width}×{height} = {width * height} pixels, more than the "
-            f"{limit} that are safe to decode unasked",
-            f"allow {width * height} pixels",
+            f"{picture.source} has {width}×{height} = {pixels} pixels, more than the {limit} that "
+            "are safe to decode unasked",
+            f"allow {pixels} pixels",
             argument="max_pixels",
         )
+
+
+def _beyond_rows(spec: Any) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return what OpenImageIO takes before and behind the rows, of tiles and of scanlines."""
+    return ((spec.x, spec.x + spec.width), (0, 1)) if spec.tile_width else ((), (0,))
 
 
 @contextmanager
@@ -402,7 +379,7 @@ def reading(source: PictureFile) -> Iterator[None]:
 
 def check_output(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> None:
     """Refuse a form that cannot hold what a picture becomes."""
-    if form in (TIFF, EXR):
+    if not form.bands:
         return
     if dtype.kind == "f":
         raise MdfconvError(f"{picture.source} holds floats, which {form} does not", "write .tif")
@@ -427,17 +404,13 @@ def written(
     file: Any = OpenImageIO.ImageOutput.create(form.library)
     if not file.open(str(path), spec):
         raise OSError(file.geterror())
+    columns, depth = _beyond_rows(spec)
+    put = file.write_tiles if spec.tile_width else file.write_scanlines
     top = spec.y
 
     def write(rows: NDArray[Any]) -> None:
         nonlocal top
-        place = top, top + len(rows)
-        if spec.tile_width:
-            columns = spec.x, spec.x + spec.width
-            done = file.write_tiles(*columns, *place, 0, 1, rows)
-        else:
-            done = file.write_scanlines(*place, 0, rows)
-        if not done:
+        if not put(*columns, top, top + len(rows), *depth, rows):
             raise OSError(file.geterror())
         top += len(rows)
 
@@ -449,9 +422,9 @@ def written(
     if not closed:
         raise OSError(file.geterror())
     if form is PNG:
-        replace_chunks(path, _png_chunks(picture))
+        headers.replace_chunks(path, _png_chunks(picture))
     if form is TGA:
-        check_tga(path, spec.image_bytes())
+        headers.check_tga(path, spec.image_bytes())
 
 
 def _output_spec(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> Any:
@@ -497,12 +470,12 @@ def _png_chunks(picture: Picture) -> bytes:
         return PngHeader(picture.source.path).texel_chunks()
     chunks, spec = b"", picture.spec
     if profile := picture.profile():
-        chunks += png_chunk(b"iCCP", b"ICC profile\0\0" + zlib.compress(profile))
+        chunks += headers.png_chunk(b"iCCP", b"ICC profile\0\0" + zlib.compress(profile))
     x, y = (spec.get_float_attribute(f"{axis}Resolution") for axis in "XY")
     per_unit = {"cm": 100.0, "none": 1.0}
     unit = spec.get_string_attribute("ResolutionUnit")
     factor = per_unit.get(unit, 1 / 0.0254)
     if 0 < x * factor < _PNG_LIMIT and 0 < y * factor < _PNG_LIMIT:
         sides = round(x * factor), round(y * factor)
-        chunks += png_chunk(b"pHYs", struct.pack(">IIB", *sides, unit != "none"))
+        chunks += headers.png_chunk(b"pHYs", struct.pack(">IIB", *sides, unit != "none"))
     return chunks

@@ -264,9 +264,7 @@ class TexelMap:
 
 def _sums(places: NDArray[Any], counts: NDArray[np.int64], size: int) -> NDArray[np.int64]:
     """Return sums of counts by their places."""
-    sums = np.zeros(size, np.int64)
-    np.add.at(sums, places, counts)
-    return sums
+    return np.bincount(places, counts, size).astype(np.int64)
 
 
 def _histogram(texels: NDArray[Any]) -> NDArray[np.int64]:

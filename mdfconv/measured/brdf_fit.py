@@ -500,7 +500,7 @@ def foreshortening(beta: Array, quantity: str) -> Array:
 
 def _smith_form(mdf: Distribution, parameter: Array) -> tuple[Distribution, Array] | None:
     """Return the distribution of the same lobe whose Λ is known, and its α; None for none."""
-    root, steps = to_root(mdf, same_lobe=True)
+    root, steps, _ = to_root(mdf, same_lobe=True)
     return (root, follow(steps, parameter)) if root.smith else None
 
 

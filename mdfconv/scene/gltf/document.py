@@ -106,8 +106,28 @@ class GltfDocument:
         """Return what a material says of its texture of roughness, None if it has none."""
         return self.materials[at].get(PBR, {}).get(TEXTURE)
 
+    @cached_property
+    def _factor_spans(self) -> dict[int, tuple[int, int]]:
+        """Where factors stand, by the places of materials, if names alone tell that."""
+        owners = [
+            at
+            for at, material in enumerate(self.materials)
+            if isinstance(material, dict)
+            and isinstance(pbr := material.get(PBR), dict)
+            and FACTOR in pbr
+        ]
+        if not owners:
+            return {}
+        spans = self.json.numbers_named(FACTOR, self.json.root["materials"])
+        # As many as there are factors: then none of them is anything else.
+        same = spans is not None and len(spans) == len(owners)
+        return dict(zip(owners, spans, strict=True)) if spans and same else {}
+
     def set_factor(self, at: int, text: str) -> None:
         """Set the roughness factor of a material to a number in JSON."""
+        if at in self._factor_spans:
+            self.json.replace(*self._factor_spans[at], text)
+            return
         start = self._places[at].start
         if PBR in self.materials[at]:
             self.json.set_members(self.json.members(start)[PBR].start, {FACTOR: text})

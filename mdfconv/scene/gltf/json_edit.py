@@ -15,6 +15,7 @@ _BLANKS = " \t\n\r"
 _SPACE = re.compile(r"[ \t\n\r]*")
 _KEY = re.compile(r'[ \t\n\r]*("(?:[^"\\]|\\.)*")([ \t\n\r]*:[ \t\n\r]*)', re.DOTALL)
 _COMMA = re.compile(r"[ \t\n\r]*,[ \t\n\r]*")
+_NUMBER = r"[ \t\n\r]*:[ \t\n\r]*([-+.0-9eE]*)"
 # Python does not read integers of thousands of digits.
 _DECODER, _ALL_FLOATS = json.JSONDecoder(), json.JSONDecoder(parse_int=float)
 
@@ -96,6 +97,25 @@ class JsonText:
     def text_of(self, place: Place) -> str:
         """Return a value as it stands in the text, without the changes."""
         return self._text[place.start : place.end]
+
+    def numbers_named(self, name: str, place: Place) -> list[tuple[int, int]] | None:
+        """Return where the numbers of all members of one name stand, however deeply.
+
+        Start and end are the same for what is no number; None if names may be written in escapes.
+        It takes a tenth of the time of looking at every member.
+        """
+        if self._text.find("\\u", place.start, place.end) >= 0:
+            return None
+        key = re.compile(f'"{name}"{_NUMBER}')
+        return [
+            match.span(1)
+            for match in key.finditer(self._text, place.start, place.end)
+            if self._text[match.start() - 1] != "\\"
+        ]
+
+    def replace(self, start: int, end: int, value: str) -> None:
+        """Replace a value by one in JSON."""
+        self._edits.append((start, end, value))
 
     def set_members(
         self, start: int, values: Mapping[str, str], renamed: Mapping[str, str] | None = None

@@ -196,7 +196,7 @@ def recommend(
     cheapest = {use: choose(candidates, tolerance, use) for use in _COSTS}
     conversions = {
         one: _cheapest_conversion(
-            source, surface, targets[one.distribution], metric, one, tolerance
+            ConversionTask(source, surface, targets[one.distribution], metric), one, tolerance
         )
         for one in dict.fromkeys(cheapest.values())
     }
@@ -249,17 +249,11 @@ def _timed_fits(
     ]
 
 
-def _cheapest_conversion(
-    source: Distribution,
-    surface: Array,
-    target: Distribution,
-    metric: Metric,
-    candidate: Candidate,
-    tolerance: float,
-) -> Candidate:
+def _cheapest_conversion(task: ConversionTask, candidate: Candidate, tolerance: float) -> Candidate:
     """Return a candidate by the cheapest method that keeps it within the tolerance."""
     if candidate.method == NOT_CONVERTED:
         return candidate
+    source, surface, target, metric, _ = task
     trials: dict[Candidate, Callable[[], object]] = {}
     for method in covering(source, target, metric):
         convert = partial(answers, method, surface, source, target, metric)

@@ -17,13 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from mdfconv.brdf.fresnel import (
-    SMOOTHIE_FIT,
-    check_index,
-    dielectric,
-    normal_reflectance,
-    smoothie_fresnel,
-)
+from mdfconv.brdf import fresnel as terms
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.output.figures import PAGE, encoded, new_figure
@@ -68,13 +62,13 @@ class FresnelFit:
     @property
     def constants(self) -> dict[str, tuple[float, float]]:
         """The constants of the approximations that have some."""
-        return {"fit": (self.a, self.b), "printed": SMOOTHIE_FIT}
+        return {"fit": (self.a, self.b), "printed": terms.SMOOTHIE_FIT}
 
     def curves(self) -> dict[str, Callable[[Array], Array]]:
         """Return the approximations of the rescaled curve by name, functions of l·H."""
         return {
-            "fit": lambda cosine: smoothie_fresnel(cosine, self.a, self.b),
-            "printed": smoothie_fresnel,
+            "fit": lambda cosine: terms.smoothie_fresnel(cosine, self.a, self.b),
+            "printed": terms.smoothie_fresnel,
             "(1-x)^5": lambda cosine: (1 - cosine) ** 5,
             "exp(-6x)": lambda cosine: np.exp(-6 * cosine),
         }
@@ -96,8 +90,8 @@ def grid() -> Array:
 
 def rescaled(cosine: Array, ior: float) -> Array:
     """Return the exact reflectance of a dielectric, mapped to [0, 1]: (F − F₀)/(1 − F₀)."""
-    least = normal_reflectance(ior)
-    return (dielectric(cosine, ior) - least) / (1 - least)
+    least = terms.normal_reflectance(ior)
+    return (terms.dielectric(cosine, ior) - least) / (1 - least)
 
 
 def fit(
@@ -133,10 +127,10 @@ def fit(
     root /= np.linalg.norm(root * target)
 
     def residual(constants: Array) -> Array:
-        return root * (smoothie_fresnel(cosine, *constants) - target)
+        return root * (terms.smoothie_fresnel(cosine, *constants) - target)
 
     def jacobian(constants: Array) -> Array:
-        slope = root * np.log(2) * smoothie_fresnel(cosine, *constants)
+        slope = root * np.log(2) * terms.smoothie_fresnel(cosine, *constants)
         return np.stack([slope, slope * path], axis=1)
 
     # The logarithm is linear in a and b; weighted by the curve it starts close to the answer.
@@ -150,7 +144,7 @@ def fit(
 
 
 def _check(ior: float, mu: float, sigma: float) -> None:
-    inside = 1 / _LARGEST_INDEX <= check_index(ior) <= _LARGEST_INDEX
+    inside = 1 / _LARGEST_INDEX <= terms.check_index(ior) <= _LARGEST_INDEX
     if not (inside and abs(ior - 1) >= _SMALLEST_CONTRAST):
         raise MdfconvError(
             "the fit takes an index of refraction from 0.25 to 4, at least 0.05 away from 1, "
@@ -192,7 +186,7 @@ def fresnel() -> PageFiles:
         (row["cosine"], row["curve"], f"{row['max_error']:.3f} ({row['rms_error']:.3f})")
         for row in rows
     ]
-    off = np.abs(np.divide((fitted.a, fitted.b), SMOOTHIE_FIT) - 1).max()
+    off = np.abs(np.divide((fitted.a, fitted.b), terms.SMOOTHIE_FIT) - 1).max()
     figures = {"a": fitted.a, "b": fitted.b, "off": float(off)}
     page = fill(
         "fresnel",

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeAlias
 
 import numpy as np
 
@@ -69,8 +68,6 @@ def printed_energy_response(alpha: float) -> float:
     return float(0.5 + square * np.log(alpha) - 0.5 * square * np.log1p(square))
 
 
-Sampler: TypeAlias = Callable[[Array, Array, Array], tuple[Array, Array]]
-
 # Gauss's rule of this order on panels that grow by this factor, from a fiftieth of the peak's
 # width on, leaves an error of 1e-8; of order 8 it leaves 2e-7.
 _ORDER = 12
@@ -98,7 +95,7 @@ class FurnaceModel:
     brdf: Brdf
     width: float
     around_mirror: bool
-    sample: Sampler
+    sample: Callable[[Array, Array, Array], tuple[Array, Array]]
 
 
 def directional_albedo(model: FurnaceModel, cosine: Array) -> Array:

@@ -22,12 +22,8 @@ _EXPONENTS = np.geomspace(1, 1e4, 81)
 # Of the roughness that is asked for.
 _ABOUT_RIGHT = 0.1
 _MIRROR = 1e-9
-_ROUGHNESS_COLUMNS, _RMSE_COLUMNS = (
-    [f"{what}_{n}" for n in EXPONENTS] for what in ("roughness", "rmse")
-)
 _LIGHT = "environment"
-_OURS = (_LIGHT, "energy", "display")
-# Above the rules, in black and grey.
+# Our metrics above the rules, in black and grey.
 _OUR_STYLES = {
     "environment": ("#000000", "-"),
     "energy": ("#666666", (0, (5, 1))),
@@ -41,16 +37,15 @@ def importers() -> PageFiles:
     curves, rules = _curves(), _rules()
     low, high = float(_EXPONENTS[0]), float(_EXPONENTS[-1])
     light = metric_named(_LIGHT)
-    formula = cheapest(
-        SearchProblem(*endpoints(shininess.SHININESS, shininess.ROUGHNESS), light, low, high), 0.01
-    )
+    pair = endpoints(shininess.SHININESS, shininess.ROUGHNESS)
+    formula = cheapest(SearchProblem(*pair, light, low, high), 0.01)
     at_100 = [rule["roughness_100"] for rule in rules]
     right = float(roughness_of(np.array([100.0]), light)[0])
     figures = {"rules": len(rules), "lowest": min(at_100), "highest": max(at_100), "right": right}
     answers = [
         (f"{n:g}", name, f"{roughness_of(np.array([n]), metric_named(name))[0]:.4g}")
         for n in map(float, (1, *EXPONENTS, 10000))
-        for name in _OURS
+        for name in _OUR_STYLES
     ]
     page = fill(
         "importers",
@@ -73,7 +68,7 @@ def importers() -> PageFiles:
 def _curves() -> dict[str, Array]:
     """Return Ns, the roughness by each rule and by ours, and the RMSE of each for the light."""
     roughness = {rule: shininess.importer_roughness(rule, _EXPONENTS) for rule in IMPORTERS}
-    roughness |= {name: roughness_of(_EXPONENTS, metric_named(name)) for name in _OURS}
+    roughness |= {name: roughness_of(_EXPONENTS, metric_named(name)) for name in _OUR_STYLES}
     light = metric_named(_LIGHT)
     errors = {
         f"RMSE {name}": shininess.error_of(_EXPONENTS, roughness[name], light)
@@ -89,8 +84,9 @@ def _rules() -> list[dict[str, Any]]:
         name = record["encoding"].partition(":")[2]
         if name in IMPORTERS:
             row = {"importer": name, "programs": record["programs"], "rule": record["formula"]}
-            row |= {key: float(f"{record[key]:.3g}") for key in _ROUGHNESS_COLUMNS}
-            rmse = {key: record[key] for key in _RMSE_COLUMNS}
+            keys = [f"roughness_{n}" for n in EXPONENTS]
+            row |= {key: float(f"{record[key]:.3g}") for key in keys}
+            rmse = {key: record[key] for key in (f"rmse_{n}" for n in EXPONENTS)}
             row |= {key: f"{e:.2g}" if np.isfinite(e) else "mirror" for key, e in rmse.items()}
             rules.append(row)
     return rules

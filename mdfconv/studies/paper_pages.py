@@ -8,27 +8,13 @@ from mdfconv.conversion import convert
 from mdfconv.distributions.endpoint import endpoints
 from mdfconv.fitting.metrics import list_metrics, metric_named
 from mdfconv.output.records import csv_text, markdown_text
-from mdfconv.render.comparison import (
-    PAPER_FIGURES,
-    PAPER_SETS,
-    REFERENCE,
-    Scene,
-    compare,
-    default_rules,
-)
+from mdfconv.render import comparison as spheres
 from mdfconv.render.comparison_figure import draw_comparison
 from mdfconv.render.page import filled, page_data
 from mdfconv.scene.shininess import ROUGHNESS
+from mdfconv.studies import table2 as paper_table
 from mdfconv.studies.error_curves import Curves, curves, draw_errors
 from mdfconv.studies.pages import PageFiles, fill, pivot
-from mdfconv.studies.table2 import (
-    AGREEMENT,
-    COLUMNS,
-    fit_table,
-    paper_sweep,
-    printed_cells,
-    refit_rows,
-)
 
 _UNIT = "unit"
 # The paper states the largest error of Blinn/Phong for these exponents.
@@ -39,23 +25,23 @@ _FIGURE_DPI, _PICTURE_SIZE = 110, 192
 
 def table2() -> PageFiles:
     """Return Table 2 and the printed cells that do not come back."""
-    rows = fit_table(*paper_sweep(), metric_named(_UNIT))
-    cells = list(printed_cells(rows))
+    rows = paper_table.fit_table(*paper_table.paper_sweep(), metric_named(_UNIT))
+    cells = list(paper_table.printed_cells(rows))
     missed = [cell for cell in cells if not cell["agrees"]]
     columns = [name for name in cells[0] if name != "agrees"]
     figures = {
         "agreeing": len(cells) - len(missed),
         "cells": len(cells),
         "missed": len(missed),
-        "tolerance": AGREEMENT,
+        "tolerance": paper_table.AGREEMENT,
     }
     page = fill(
         "table2",
-        table=markdown_text(COLUMNS, rows),
+        table=markdown_text(paper_table.COLUMNS, rows),
         missed_table=markdown_text(columns, missed),
         **figures,
     )
-    return PageFiles([page, csv_text(COLUMNS, rows)], figures)
+    return PageFiles([page, csv_text(paper_table.COLUMNS, rows)], figures)
 
 
 def table2_by_metric() -> PageFiles:
@@ -63,23 +49,23 @@ def table2_by_metric() -> PageFiles:
     files, links = [], []
     for name in list_metrics()[1:]:
         metric = metric_named(name)
-        rows = fit_table(*paper_sweep(), metric)
+        rows = paper_table.fit_table(*paper_table.paper_sweep(), metric)
         page = fill(
             "table2-metric",
             metric=name,
             keeps=metric.keeps,
             smoothest=rows[-1]["m_b"],
             ratio=rows[-1]["c_tr"] / rows[-1]["m_b"],
-            table=markdown_text(COLUMNS, rows),
+            table=markdown_text(paper_table.COLUMNS, rows),
         )
-        files += [page, csv_text(COLUMNS, rows)]
+        files += [page, csv_text(paper_table.COLUMNS, rows)]
         links.append(f"[table2-{name}.md](table2-{name}.md)")
     return PageFiles(files, {"links": ", ".join(links)})
 
 
 def closed_forms() -> PageFiles:
     """Return the paper's coefficients beside refitted ones."""
-    rows = refit_rows([metric_named(name) for name in list_metrics()])
+    rows = paper_table.refit_rows([metric_named(name) for name in list_metrics()])
     coefficients = [(row["formula"], "a, b", row["printed"]) for row in rows]
     printed = [(row["formula"], row["metric"], f"{row['worst_printed']:.2%}") for row in rows]
     refitted = [
@@ -105,10 +91,11 @@ def closed_forms() -> PageFiles:
 
 def errors() -> PageFiles:
     """Return Figures 1 and 2, and their maxima beside the paper's prose."""
-    drawn = {name: curves(parameters) for name, parameters in PAPER_SETS.items()}
+    drawn = {name: curves(parameters) for name, parameters in spheres.PAPER_SETS.items()}
     maxima = [{"figure": name} | row for name, each in drawn.items() for row in each.maxima()]
     stated = {
-        n: {REFERENCE: convert(n, "blinn-phong", REFERENCE), "blinn-phong": n} for n in _STATED
+        n: {spheres.REFERENCE: convert(n, "blinn-phong", spheres.REFERENCE), "blinn-phong": n}
+        for n in _STATED
     }
     figures: dict[str, Any] = {name: _largest(each) for name, each in drawn.items()}
     figures["blinn_phong"] = {
@@ -130,10 +117,10 @@ def pictures() -> PageFiles:
     """Return Figures 4 and 5: pictures, sections through the highlight, and their errors."""
     files: list[str | bytes] = []
     rows: list[dict[str, Any]] = []
-    scene = Scene(size=_PICTURE_SIZE)
-    rules = default_rules(scene.exposure)
-    for name, m_b in PAPER_FIGURES.items():
-        comparison = compare(m_b, rules, scene)
+    scene = spheres.Scene(size=_PICTURE_SIZE)
+    rules = spheres.default_rules(scene.exposure)
+    for name, m_b in spheres.PAPER_FIGURES.items():
+        comparison = spheres.compare(m_b, rules, scene)
         files += [draw_comparison(comparison, _FIGURE_DPI), csv_text(*comparison.section_rows())]
         rows += [{"figure": name} | row for row in comparison.table()]
     figures = {
@@ -142,7 +129,7 @@ def pictures() -> PageFiles:
             for row in rows
             if (row["figure"], row["conversion"]) == (name, rules[0].label)
         }
-        for name in PAPER_FIGURES
+        for name in spheres.PAPER_FIGURES
     }
     columns = [name for name in rows[0] if not name.startswith("psnr")]
     page = fill("pictures", table=markdown_text(columns, rows), **figures)
@@ -151,5 +138,5 @@ def pictures() -> PageFiles:
 
 def comparison() -> PageFiles:
     """Return the page for a browser: the reference and what most renderers have, with sliders."""
-    data = page_data(*endpoints(REFERENCE, ROUGHNESS))
+    data = page_data(*endpoints(spheres.REFERENCE, ROUGHNESS))
     return PageFiles([filled(data)], {"interpolation": data["interpolation"]})

@@ -127,16 +127,13 @@ class TextureConversion:
         }
         free |= {id(self._document.texture_of(at)) for at in self.notes}
         images = set()
-        for key, value in self._document.everything:
-            if (
-                key.lower().endswith("texture")
-                and isinstance(value, dict)
-                and id(value) not in free
-            ):
+        everything = self._document.everything
+        for texture in [value for key, value in everything if key.lower().endswith("texture")]:
+            if isinstance(texture, dict) and id(texture) not in free:
                 # What names nothing uses nothing.
                 with suppress(MdfconvError):
-                    texture = index_of(_index(value), self._textures, "texture")
-                    source = self._textures[texture].value.get("source")
+                    at = index_of(_index(texture), self._textures, "texture")
+                    source = self._textures[at].value.get("source")
                     images.add(index_of(source, self._images.images, "image"))
         return images
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mdfconv.errors import MdfconvError
@@ -150,9 +150,13 @@ class MitsubaScene:
         referred = Counter(each.get("id") for each in by_tag["ref"] + by_tag["alias"])
         self.uses = Counter({each: referred[name] for name, each in self._textures.items()})
         if by_tag["texture"]:
-            self.uses.update(_textures_that_are_properties(elements))
+            # Those that stand in other objects; a scene only gives them an id.
+            owners = (each for each in elements if each.children and each.tag != "scene")
+            properties = (child for owner in owners for child in owner.children)
+            self.uses.update(child for child in properties if child.tag == "texture")
         if b"$" in data:
-            used = Counter(_parameters_used(elements))
+            values = (value for each in elements for value in each.attributes.values())
+            used = Counter(name for value in values for name in _PARAMETER.findall(value))
             self.uses.update({each: used[name] for name, each in self._defaults.items()})
         self.bsdfs = [self._bsdf(each) for each in by_tag["bsdf"] if each.get("type") in _TYPES]
 
@@ -286,20 +290,6 @@ class MitsubaScene:
         if self.includes:
             return f"alpha is {what}, which an included file may use, too"
         return f"alpha is {what}, which is not only that of BSDFs converted alike"
-
-
-def _textures_that_are_properties(elements: list[Element]) -> Iterator[Element]:
-    """Yield the textures that stand in other objects; a scene only gives them an id."""
-    for element in elements:
-        if element.children and element.tag != "scene":
-            yield from (child for child in element.children if child.tag == "texture")
-
-
-def _parameters_used(elements: list[Element]) -> Iterator[str]:
-    for element in elements:
-        for value in element.attributes.values():
-            if "$" in value:
-                yield from _PARAMETER.findall(value)
 
 
 def _properties(bsdf: Element) -> dict[str, Element]:

@@ -6,10 +6,9 @@ import struct
 import zlib
 from math import ceil
 from pathlib import Path
-from typing import TypeAlias
 
 # Why a file is no texture, and what helps.
-Reason: TypeAlias = tuple[str, str]
+Reason = tuple[str, str]
 PALETTE = ("has a palette: its texels are indices, not values", "save it as grey or RGB")
 SEVERAL_PICTURES = ("holds several pictures, of which only one would be kept", "split it")
 # Chunks that say how a PNG's texels are meant, and stay true when some are converted.

@@ -141,12 +141,10 @@ class StoredConverter:
     def remaining(self, parameter: Array, result: Array) -> Array:
         """Return the errors of some results, shape (n,); NaN where either is no lobe."""
         lobes = self.target.decode_legal(result)
-        known = ~np.isnan(parameter) & ~np.isnan(lobes)
+        both = ~np.isnan(parameter) & ~np.isnan(lobes)
         rmse = np.full(lobes.shape, np.nan)
         source, target = self._pair
-        rmse[known], _ = remaining_error(
-            source, parameter[known], target, lobes[known], self.metric
-        )
+        rmse[both], _ = remaining_error(source, parameter[both], target, lobes[both], self.metric)
         return rmse
 
     def refusal(self, number: ConvertedNumber) -> str:

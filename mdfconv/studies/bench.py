@@ -179,9 +179,7 @@ def substitutes(task: Task, advance: Advance) -> list[Row]:
             for candidate, fit in zip(task.candidates, fits, strict=True)
         ]
         how = task.sizes.angles, task.sizes.rounds, advance
-        times = {
-            f"ns_{precision}": evaluation_times(lobes, precision, *how) for precision in PRECISIONS
-        }
+        times = {f"ns_{dtype}": evaluation_times(lobes, dtype, *how) for dtype in PRECISIONS}
         for place, candidate in enumerate(task.candidates):
             row = {
                 "reference": task.reference.name,
@@ -347,10 +345,9 @@ def curve_fit_loop(
             def signal(angle: Array, log_parameter: float, row: int = row) -> Array:
                 return metric.signal(target, angle, np.exp([log_parameter]), peak[row])
 
+            start = [np.log(starts[row])]
             try:
-                fitted, _ = curve_fit(
-                    signal, beta[row], reference[row], [np.log(starts[row])], sigma[row]
-                )
+                fitted, _ = curve_fit(signal, beta[row], reference[row], start, sigma[row])
             except RuntimeError:
                 continue
             results[row] = np.exp(fitted[0])

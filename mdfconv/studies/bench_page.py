@@ -153,9 +153,7 @@ def _rounded(value: float, digits: int = 3) -> float:
 
 
 def _times(times: Spread) -> str:
-    median, low, high = (
-        f"{value:#.3g}" if value < 100 else f"{_rounded(value):,.0f}" for value in times
-    )
+    median, low, high = (f"{ns:#.3g}" if ns < 100 else f"{_rounded(ns):,.0f}" for ns in times)
     return f"{median} ({low}–{high})"
 
 

@@ -243,9 +243,7 @@ def _rings(grazing: float, width: float) -> tuple[Array, Array]:
     end = np.pi / 2
     lobe = _growing(min(_FIRST_PANEL * width, end), end)
     root = _growing(_LEAST_PANEL, end)
-    near = np.concatenate(
-        [grazing - lobe, grazing + lobe, grazing - root, grazing + root, end - root]
-    )
+    near = np.hstack([grazing - lobe, grazing + lobe, grazing - root, grazing + root, end - root])
     edges = np.unique(np.concatenate([lobe, near[(near > 0) & (near < end)]]))
     return gauss_panels(edges, _ORDER)
 

@@ -118,16 +118,13 @@ def read_renders() -> Renders:
     def numbers(column: str) -> Array:
         return np.array([float(row[column]) for row in rows])
 
-    return Renders(
-        tuple(row["environment"] for row in rows),
-        numbers("m_b"),
-        numbers("predicted_linear"),
-        {name: numbers(f"best_{column}") for name, column in _COLUMNS.items()},
-        {
-            name: np.stack([numbers(f"cost_{column}_{ratio}") for ratio in RULES], axis=1)
-            for name, column in _COLUMNS.items()
-        },
-    )
+    environments = tuple(row["environment"] for row in rows)
+    best = {name: numbers(f"best_{column}") for name, column in _COLUMNS.items()}
+    costs = {
+        name: np.stack([numbers(f"cost_{column}_{ratio}") for ratio in RULES], axis=1)
+        for name, column in _COLUMNS.items()
+    }
+    return Renders(environments, numbers("m_b"), numbers("predicted_linear"), best, costs)
 
 
 def best_ratio(exponent: float) -> float:

@@ -77,9 +77,8 @@ def made(pages: Sequence[Page], processes: int | None = None) -> Iterator[PageFi
         yield from (page.make() for page in pages)
         return
     # An interrupt from a terminal reaches every process: those of the pool end at once, unheard.
-    pool = ProcessPoolExecutor(
-        count, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_DFL)
-    )
+    default = signal.SIGINT, signal.SIG_DFL
+    pool = ProcessPoolExecutor(count, initializer=signal.signal, initargs=default)
     try:
         slowest_first = sorted(pages, key=lambda page: not page.slow)
         begun = {page.make: pool.submit(page.make) for page in slowest_first}

@@ -213,12 +213,8 @@ FORMS: Sequence[Law] = (
     Law("blinn-phong", "sawicki", "N_DS = a N + b", lambda x, a, b: a * x + b, (1.174, 0.3)),
     Law("sawicki", "blinn-phong", "N = (N_DS − b)/a", lambda x, a, b: (x - b) / a, (1.174, 0.3)),
     Law("ggx", "gauss", "m_G = a C + b C³", _odd, (0.8222, 0.82)),
-    Law(
-        "ggx", "beckmann", "m_B = a C + b C⁴", lambda x, a, b: a * x + b * x**4, (0.8388, 0.7)
-    ),
-    Law(
-        "ggx", "blinn-phong", "N = a²/C² − b", lambda x, a, b: (a / x) ** 2 - b, (1.696, 4.5)
-    ),
+    Law("ggx", "beckmann", "m_B = a C + b C⁴", lambda x, a, b: a * x + b * x**4, (0.8388, 0.7)),
+    Law("ggx", "blinn-phong", "N = a²/C² − b", lambda x, a, b: (a / x) ** 2 - b, (1.696, 4.5)),
     Law("gauss", "ggx", "C = a m_G + b m_G³", _odd, (1.186, -0.835)),
     Law("beckmann", "ggx", "C = a m_B + b m_B³", _odd, (1.2, -0.56)),
     Law("blinn-phong", "ggx", "C = a/√(N+b)", lambda x, a, b: a / np.sqrt(x + b), (1.697, 4.5)),

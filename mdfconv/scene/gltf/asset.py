@@ -129,9 +129,8 @@ def convert_gltf(
         problems |= changes.problems
     else:
         problems |= dict.fromkeys(textured, ("has a roughness texture", ProblemKind.TEXTURE))
-    numbers, reasons, notes = _numbers(
-        plain.values(), stored.StoredConverter(*pair, metric, largest=1)
-    )
+    convert = stored.StoredConverter(*pair, metric, largest=1)
+    numbers, reasons, notes = _numbers(plain.values(), convert)
     for at, factor in plain.items():
         if factor in reasons:
             problems[at] = reasons[factor], ProblemKind.OTHER

@@ -213,9 +213,7 @@ def _converted(sources: Sequence[_SourceLines], to: str, metric: Metric) -> list
         exponent, roughness = exponent_of(values, metric), values
     columns = exponent.tolist(), roughness.tolist(), fit_error(exponent, metric).tolist()
     rows = list(zip(*columns, strict=True))
-    return [
-        _material(source, *rows[at]) for source, at in zip(sources, index.tolist(), strict=True)
-    ]
+    return [_material(each, *rows[at]) for each, at in zip(sources, index.tolist(), strict=True)]
 
 
 def _material(source: _SourceLines, shininess: float, roughness: float, rmse: float) -> MtlMaterial:

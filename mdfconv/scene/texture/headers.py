@@ -78,9 +78,8 @@ class PngHeader:
 
     def texel_chunks(self) -> bytes:
         """Return the chunks that belong into the converted file."""
-        return b"".join(
-            png_chunk(name, self._chunks[name]) for name in _TEXEL_CHUNKS if name in self._chunks
-        )
+        names = (name for name in _TEXEL_CHUNKS if name in self._chunks)
+        return b"".join(png_chunk(name, self._chunks[name]) for name in names)
 
 
 def png_chunk(name: bytes, data: bytes) -> bytes:

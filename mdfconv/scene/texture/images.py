@@ -439,9 +439,8 @@ def _output_spec(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> A
         if not _is_lossless(original):
             spec.attribute("compression", "zip")
     else:
-        spec = OpenImageIO.ImageSpec(
-            picture.width, picture.height, original.nchannels, _NAMES[dtype.name]
-        )
+        size = picture.width, picture.height
+        spec = OpenImageIO.ImageSpec(*size, original.nchannels, _NAMES[dtype.name])
         spec.channelnames, spec.alpha_channel = original.channelnames, original.alpha_channel
         spec.attribute("oiio:UnassociatedAlpha", 1)
         spec.attribute("compression", "none" if form is TGA else "zip")

@@ -291,14 +291,11 @@ def method_speeds(task: Task, advance: Advance) -> list[Row]:
     # Among more values most fits come from a curve: here each is found by itself.
     counts = {LOOP: sizes.loop, "fit": sizes.fits}
     values = [counts.get(name, sizes.conversions) for name, _, _ in methods]
-    times = interleave(
-        {
-            (name, metric): partial(convert, sweep(source, count), source, target, metric)
-            for (name, metric, convert), count in zip(methods, values, strict=True)
-        },
-        sizes.rounds,
-        advance,
-    )
+    conversions = {
+        (name, metric): partial(convert, sweep(source, count), source, target, metric)
+        for (name, metric, convert), count in zip(methods, values, strict=True)
+    }
+    times = interleave(conversions, sizes.rounds, advance)
     rows = []
     for (name, metric, convert), count in zip(methods, values, strict=True):
         parameter = sweep(source, min(count, sizes.fits))

@@ -99,6 +99,7 @@ def markdown_page(measurements: Measurements, picture: str | None = None) -> str
         ]
         for precision in PRECISIONS
     }
+    shown = f"![Error against time, distributions and methods]({picture})\n\n" if picture else ""
     return fill(
         "speed-error",
         least_gain=min(gains),
@@ -110,9 +111,7 @@ def markdown_page(measurements: Measurements, picture: str | None = None) -> str
         most_share={name: max(values) for name, values in shares.items()},
         machine=measurements.machine,
         sizes=vars(measurements.sizes),
-        picture=f"![Error against time, distributions and methods]({picture})\n\n"
-        if picture
-        else "",
+        picture=shown,
         pair=_pair(measurements),
         **{name: markdown_text(list(rows[0]), rows) for name, rows in tables(measurements).items()},
     )

@@ -35,12 +35,9 @@ def table2() -> PageFiles:
         "missed": len(missed),
         "tolerance": paper_table.AGREEMENT,
     }
-    page = fill(
-        "table2",
-        table=markdown_text(paper_table.COLUMNS, rows),
-        missed_table=markdown_text(columns, missed),
-        **figures,
-    )
+    table = markdown_text(paper_table.COLUMNS, rows)
+    missed_table = markdown_text(columns, missed)
+    page = fill("table2", table=table, missed_table=missed_table, **figures)
     return PageFiles([page, csv_text(paper_table.COLUMNS, rows)], figures)
 
 
@@ -79,12 +76,9 @@ def closed_forms() -> PageFiles:
         }
         for error in ("worst_printed", "worst_refitted")
     }
-    page = fill(
-        "closed-forms",
-        printed=pivot("formula", coefficients + printed),
-        refitted=pivot("formula", refitted),
-        **worst,
-    )
+    printed_table = pivot("formula", coefficients + printed)
+    refitted_table = pivot("formula", refitted)
+    page = fill("closed-forms", printed=printed_table, refitted=refitted_table, **worst)
     shown = [row | {error: f"{row[error]:.4g}" for error in worst} for row in rows]
     return PageFiles([page, csv_text(list(shown[0]), shown)], worst)
 

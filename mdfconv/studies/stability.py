@@ -219,14 +219,10 @@ def _kernel_cases(audited: Distribution, rows: _Rows, dtype: Any) -> Iterator[Ha
         # float16 overflows where the normalized form of a mirror-smooth surface exceeds 65504.
         with np.errstate(over="ignore"):
             values = evaluate(beta, p)
-        yield HardCases(
-            form,
-            row["regime"],
-            values,
-            printed_form(shape, form, beta, p),
-            [Decimal(text) for text in row["value"].split()],
-            [f"β = {angle}, {where}" for angle in angles],
-        )
+        printed = printed_form(shape, form, beta, p)
+        exact = [Decimal(text) for text in row["value"].split()]
+        cases = [f"β = {angle}, {where}" for angle in angles]
+        yield HardCases(form, row["regime"], values, printed, exact, cases)
 
 
 def printed_form(shape: Distribution, form: str, beta: Array, parameter: Any) -> Array:
@@ -291,13 +287,10 @@ def _formula_batches(source: Distribution, rows: _Rows) -> Iterator[_Batch]:
         for name in [column for column in members[0] if column not in _KEYS]:
             converted = [row for row in members if row[name]]
             if converted:
-                yield _Batch(
-                    _with_gamma(source, gamma),
-                    _with_gamma(distribution(name), gamma),
-                    regime,
-                    [row["value"] for row in converted],
-                    [Decimal(row[name]) for row in converted],
-                )
+                ends = _with_gamma(source, gamma), _with_gamma(distribution(name), gamma)
+                values = [row["value"] for row in converted]
+                exact = [Decimal(row[name]) for row in converted]
+                yield _Batch(*ends, regime, values, exact)
 
 
 def _with_gamma(end: Distribution, gamma: str) -> Distribution:
@@ -321,15 +314,10 @@ def _forth_and_back(method: Method, batch: _Batch, dtype: Any) -> Iterator[HardC
         return
     if textbook is not None:
         textbook = printed_conversion(method, target, source, textbook)
-    yield HardCases(
-        f"{method.name} and back",
-        batch.regime,
-        _converted(converted, target, source, method),
-        textbook,
-        [Decimal(float(value)) for value in values],
-        [f"{case} → {source.name}" for case in batch.cases],
-        round_trip=True,
-    )
+    rule, back = f"{method.name} and back", _converted(converted, target, source, method)
+    start = [Decimal(float(value)) for value in values]
+    cases = [f"{case} → {source.name}" for case in batch.cases]
+    yield HardCases(rule, batch.regime, back, textbook, start, cases, round_trip=True)
 
 
 def printed_conversion(
@@ -377,15 +365,11 @@ def _encodings(source: Distribution) -> Iterator[HardCases]:
         for regime, texts in (_ENCODED_EXPONENTS if smooth else _ENCODED).items():
             for dtype in _CONVERSION_TYPES:
                 values = np.array(texts, dtype=dtype)
-                yield HardCases(
-                    f"{encoding.name} and back",
-                    regime,
-                    convert(convert(values, source.name, label), label, source.name),
-                    None,
-                    [Decimal(float(value)) for value in values],
-                    [f"{text} → {encoding.name} → {source.parameter.symbol}" for text in texts],
-                    round_trip=True,
-                )
+                back = convert(convert(values, source.name, label), label, source.name)
+                start = [Decimal(float(value)) for value in values]
+                cases = [f"{text} → {encoding.name} → {source.parameter.symbol}" for text in texts]
+                rule = f"{encoding.name} and back"
+                yield HardCases(rule, regime, back, None, start, cases, round_trip=True)
 
 
 _PARTS = {"kernels": audit_kernels, "conversions": audit_conversions}

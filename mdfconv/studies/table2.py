@@ -77,10 +77,8 @@ def fit_table(
         batch = slice(start, start + _BATCH)
         with np.errstate(all="ignore"):  # what overflows has no best fit
             columns = _columns(m_b[batch], limit[batch], metric, extended=extended)
-        rows += [
-            dict(zip(columns, row, strict=True))
-            for row in np.stack([*columns.values()], 1).tolist()
-        ]
+        table = np.stack([*columns.values()], 1).tolist()
+        rows += [dict(zip(columns, row, strict=True)) for row in table]
         progress(min(start + _BATCH, m_b.size) - start)
     return rows
 

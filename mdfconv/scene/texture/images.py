@@ -150,7 +150,7 @@ def check_files(
 ) -> tuple[PictureForm, PictureForm]:
     """Return the forms of two files; refuse those between which no texture can go."""
     form = _form_of(source)
-    output_form = _form_named(output.path)
+    new_form = _form_named(output.path)
     if form is JPEG and not lossy:
         raise MdfconvError(
             f"{source} is a JPEG, which has altered the values (8-bit blocks with losses, made "
@@ -158,19 +158,17 @@ def check_files(
             _ACCEPT_LOSSES,
             argument="lossy",
         )
-    if output_form is JPEG:
+    if new_form is JPEG:
         raise MdfconvError(f"{output}: a JPEG would alter the values", "write .png or .tif")
-    if output_form is None:
+    if new_form is None:
         raise MdfconvError(f"{output} does not end in .png, .tif, .tiff, .tga or .exr")
-    if (form is EXR) != (output_form is EXR):
+    if (form is EXR) != (new_form is EXR):
         kind, endings = ("floats", ".exr") if form is EXR else ("integers", ".png or .tif")
-        raise MdfconvError(
-            f"{source} holds {kind}, which {output_form} does not", f"write {endings}"
-        )
+        raise MdfconvError(f"{source} holds {kind}, which {new_form} does not", f"write {endings}")
     place = output.path
     if place == source.path or (place.exists() and place.samefile(source.path)):
         raise MdfconvError(f"{output} is the same file as {source}", "write to another one")
-    return form, output_form
+    return form, new_form
 
 
 def _form_of(source: PictureFile) -> PictureForm:

@@ -163,14 +163,10 @@ class ValueConverter:
 
     def __init__(self, rule: TextureRule) -> None:
         source, target = rule.endpoints()
+        metric = metric_named(rule.metric)
         # Texels are exact down to the smallest exponent.
-        self._convert = StoredConverter(
-            source,
-            target,
-            metric_named(rule.metric),
-            rule.method,
-            uniform_below=np.finfo(float).tiny,
-        )
+        tiny = np.finfo(float).tiny
+        self._convert = StoredConverter(source, target, metric, rule.method, uniform_below=tiny)
         self._factor = rule.factor
         scale = f"{' of' if source.encoding else ':'} {rule.factor:g} v" if rule.factor != 1 else ""
         self.labels = source.label + scale, target.label

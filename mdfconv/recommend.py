@@ -201,10 +201,8 @@ def recommend(
         for one in dict.fromkeys(cheapest.values())
     }
     chosen = {use: conversions[candidate] for use, candidate in cheapest.items()}
-    others = sorted(
-        (candidate for candidate in candidates if candidate not in conversions),
-        key=lambda candidate: (candidate.max_error > tolerance, candidate.ns),
-    )
+    rest = [candidate for candidate in candidates if candidate not in conversions]
+    others = sorted(rest, key=lambda one: (one.max_error > tolerance, one.ns))
     reason = _reason(chosen, candidates, source.name, tolerance)
     return Recommendation(chosen, tuple(others), tolerance, reason)
 
@@ -235,18 +233,13 @@ def _timed_fits(
     fits = [fit for fit in fits if not np.isnan(fit[1][0])]
     lobes = [(target, float(parameter[0])) for target, parameter, *_ in fits]
     times = evaluation_times(lobes, "float32", _ANGLES, _ROUNDS)
-    return [
-        Candidate(
-            target.name,
-            float(parameter[0]),
-            NOT_CONVERTED if source.is_same(target) else "fit",
-            time.median,
-            target.operations,
-            float(rmse[0]),
-            float(max_error[0]),
-        )
-        for (target, parameter, rmse, max_error), time in zip(fits, times, strict=True)
-    ]
+    candidates = []
+    for (target, *arrays), time in zip(fits, times, strict=True):
+        parameter, rmse, max_error = (float(array[0]) for array in arrays)
+        method = NOT_CONVERTED if source.is_same(target) else "fit"
+        cost = time.median, target.operations
+        candidates.append(Candidate(target.name, parameter, method, *cost, rmse, max_error))
+    return candidates
 
 
 def _cheapest_conversion(task: ConversionTask, candidate: Candidate, tolerance: float) -> Candidate:
@@ -260,14 +253,9 @@ def _cheapest_conversion(task: ConversionTask, candidate: Candidate, tolerance: 
         result = convert()
         if np.isnan(result[0]):
             continue
-        rmse, largest = remaining_error(source, surface, target, result, metric)
-        trial = replace(
-            candidate,
-            parameter=float(result[0]),
-            method=method.name,
-            rmse=float(rmse[0]),
-            max_error=float(largest[0]),
-        )
+        errors = remaining_error(source, surface, target, result, metric)
+        new, rmse, largest = (float(each[0]) for each in (result, *errors))
+        trial = replace(candidate, parameter=new, method=method.name, rmse=rmse, max_error=largest)
         if trial.max_error <= tolerance:
             trials[trial] = convert
     samples = interleave(trials, _CONVERSION_ROUNDS, lambda steps: None)

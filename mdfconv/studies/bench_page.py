@@ -204,20 +204,14 @@ def draw(measurements: Measurements, dpi: int = 120) -> bytes:
     names = dict.fromkeys(point.name for point in methods)
     _draw_panel(left, substitutes, {p.name: line_style(p.name)["color"] for p in substitutes})
     _draw_panel(right, methods, dict(zip(names, cycle(_COLORS), strict=False)))
-    left.set(
-        title=TITLES["substitutes"],
-        xlabel="time of an evaluation, float32 [ns]",
-        ylabel="RMSE of the best fit, unit form",
-    )
+    left.set(title=TITLES["substitutes"], xlabel="time of an evaluation, float32 [ns]")
+    left.set_ylabel("RMSE of the best fit, unit form")
     # So few powers of ten that one cannot read between them.
     left.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     left.xaxis.set_major_formatter("{x:g}")
     left.xaxis.set_minor_formatter("")
-    right.set(
-        title=title(measurements, "methods"),
-        xlabel="time of a conversion [ns]",
-        ylabel="median relative error of the parameter against fit",
-    )
+    right.set(title=title(measurements, "methods"), xlabel="time of a conversion [ns]")
+    right.set_ylabel("median relative error of the parameter against fit")
     return encoded(figure, dpi=dpi)
 
 
@@ -237,26 +231,14 @@ def _draw_panel(axes: Any, points: Iterable[_Point], colors: dict[str, str]) -> 
         )
         for point in own:
             median, low, high = point.nanoseconds
-            axes.errorbar(
-                median,
-                point.error,
-                xerr=[[median - low], [high - median]],
-                elinewidth=0.8,
-                marker=shapes[point.name],
-                color=colors[point.name],
-                linestyle="",
-                label=None if point.name in named else point.name,
-                **style,
-            )
+            quartiles = {"xerr": [[median - low], [high - median]], "elinewidth": 0.8}
+            label = None if point.name in named else point.name
+            marked = style | {"marker": shapes[point.name], "color": colors[point.name]}
+            axes.errorbar(median, point.error, label=label, linestyle="", **quartiles, **marked)
             named.add(point.name)
-    axes.legend(
-        loc="upper center",
-        bbox_to_anchor=(0.5, -0.13),
-        ncols=3,
-        fontsize=8,
-        title="lines: what nothing is both quicker and nearer than",
-        title_fontsize=8,
-    )
+    caption = "lines: what nothing is both quicker and nearer than"
+    below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13), "ncols": 3}
+    axes.legend(title=caption, fontsize=8, title_fontsize=8, **below)
     # Linear below the smallest error, so that an error of 0 is shown.
     smallest = min((point.error for point in points if point.error > _ROUNDING), default=1.0)
     axes.set_yscale("symlog", linthresh=smallest)

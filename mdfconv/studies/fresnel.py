@@ -220,22 +220,14 @@ def draw_fresnel(fitted: FresnelFit) -> bytes:
         label = f"{name}, a = {a_b[0]:.4f}, b = {a_b[1]:.4f}" if a_b else name
         left.plot(cosine, approximation(cosine), label=label, linewidth=1.6, **_STYLES[name])
         right.plot(cosine, fitted.error(approximation, cosine), linewidth=1.6, **_STYLES[name])
-    left.set(
-        xlabel="l·H",
-        ylabel="(F − F₀) / (1 − F₀)",
-        title="Rescaled reflectance: grazing at 0, along the normal at 1",
-        ylim=(-0.02, 1.02),
-    )
+    left.set(xlabel="l·H", ylabel="(F − F₀) / (1 − F₀)", ylim=(-0.02, 1.02))
+    left.set_title("Rescaled reflectance: grazing at 0, along the normal at 1")
     # The weight stands on the bottom of the axes, behind the errors, on a scale of its own.
     scale = right.twinx()
     scale.fill_between(cosine, fitted.weight(cosine), color="0.9", linewidth=0)
     scale.set(ylim=(0, 2.5), yticks=[], zorder=right.get_zorder() - 1)
     right.patch.set_visible(False)
-    right.set(
-        xlabel="l·H",
-        ylabel="approximation − exact",
-        title=f"Error at IOR {fitted.ior:g}; grey: the weight of the fit",
-        ylim=(-0.12, 0.12),
-    )
+    right.set(xlabel="l·H", ylabel="approximation − exact", ylim=(-0.12, 0.12))
+    right.set_title(f"Error at IOR {fitted.ior:g}; grey: the weight of the fit")
     figure.legend(loc="outside lower center", ncols=4)
     return encoded(figure, dpi=110)

@@ -308,18 +308,10 @@ def draw_lights(renders: Renders, exponents: Array, metrics: Mapping[str, float]
             handles += left.plot(exponents[case], best, label=label, **marked)
             if name == LINEAR:
                 right.plot(renders.predicted[case], best, **marked)
-    left.set(
-        xlabel="exponent p of the power law that has the predicted ratio",
-        ylabel="best α / m_B",
-        title="GGX in Beckmann's place, over the light",
-    )
-    right.set(
-        xlabel="α / m_B predicted from the light's own spectrum",
-        ylabel=f"α / m_B of least {LINEAR}, rendered",
-        title="Predicted and rendered",
-        xlim=_DIAGONAL,
-        ylim=_DIAGONAL,
-        aspect="equal",
-    )
+    left.set(ylabel="best α / m_B", title="GGX in Beckmann's place, over the light")
+    left.set_xlabel("exponent p of the power law that has the predicted ratio")
+    right.set(title="Predicted and rendered", xlim=_DIAGONAL, ylim=_DIAGONAL, aspect="equal")
+    right.set_xlabel("α / m_B predicted from the light's own spectrum")
+    right.set_ylabel(f"α / m_B of least {LINEAR}, rendered")
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return encoded(figure, dpi=110)

@@ -47,14 +47,10 @@ def table2_by_metric() -> PageFiles:
     for name in list_metrics()[1:]:
         metric = metric_named(name)
         rows = paper_table.fit_table(*paper_table.paper_sweep(), metric)
-        page = fill(
-            "table2-metric",
-            metric=name,
-            keeps=metric.keeps,
-            smoothest=rows[-1]["m_b"],
-            ratio=rows[-1]["c_tr"] / rows[-1]["m_b"],
-            table=markdown_text(paper_table.COLUMNS, rows),
-        )
+        table, last = markdown_text(paper_table.COLUMNS, rows), rows[-1]
+        smoothest, ratio = last["m_b"], last["c_tr"] / last["m_b"]
+        figures = {"metric": name, "keeps": metric.keeps, "smoothest": smoothest, "ratio": ratio}
+        page = fill("table2-metric", table=table, **figures)
         files += [page, csv_text(paper_table.COLUMNS, rows)]
         links.append(f"[table2-{name}.md](table2-{name}.md)")
     return PageFiles(files, {"links": ", ".join(links)})

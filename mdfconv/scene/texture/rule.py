@@ -110,14 +110,10 @@ class TextureRule:
         """Return how a texture stores a parameter that scenes use beyond 1."""
         largest, scale, symbol = self.exponent_max, self.log2_scale, parameter.symbol
         # The roughest and the smoothest that fit: N from 1 up.
-        linear = replace(
-            ROUGHNESS.stored,
-            name="exponent",
-            symbol="v",
-            typical=(min(1 / largest, 1.0), 1.0),
-            larger_is_smoother=parameter.larger_is_smoother,
-        )
-        logarithmic = replace(linear, name="log2", typical=(0.0, 1.0), lower_closed=True)
+        smoother, typical = parameter.larger_is_smoother, (min(1 / largest, 1.0), 1.0)
+        share = replace(ROUGHNESS.stored, symbol="v", larger_is_smoother=smoother)
+        linear = replace(share, name="exponent", typical=typical)
+        logarithmic = replace(share, name="log2", typical=(0.0, 1.0), lower_closed=True)
         return (
             Encoding(
                 "exponent",

@@ -137,11 +137,8 @@ def measure(task: Task, advance: Advance) -> Measurements:
     """
     # The conversions come first: they may refuse the pair.
     methods = method_speeds(task, advance)
-    tables = {
-        "substitutes": substitutes(task, advance),
-        "methods": methods,
-        "kernels": kernel_speeds(task, advance),
-    }
+    tables = {"substitutes": substitutes(task, advance), "methods": methods}
+    tables["kernels"] = kernel_speeds(task, advance)
     return Measurements(machine(), task.sizes, tables)
 
 

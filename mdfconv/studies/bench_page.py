@@ -91,12 +91,9 @@ def markdown_page(measurements: Measurements, picture: str | None = None) -> str
     ]
     formulas = [row for row in methods if row["method"] not in ("fit", LOOP)]
     quickest = max(formulas, key=lambda row: row["per_second"].median)
+    kernels = measurements.tables["kernels"]
     shares = {
-        precision: [
-            1 / row["speedup"]
-            for row in measurements.tables["kernels"]
-            if row["precision"] == precision
-        ]
+        precision: [1 / row["speedup"] for row in kernels if row["precision"] == precision]
         for precision in PRECISIONS
     }
     shown = f"![Error against time, distributions and methods]({picture})\n\n" if picture else ""

@@ -205,6 +205,7 @@ def _width_power(mdf: Distribution) -> float:
 def lights() -> PageFiles:
     """Return the evidence for the metrics: theory, rendered spheres, constants."""
     renders, constants = read_renders(), smooth_constants()
+    best = renders.best.items()
     exponents = np.array([equivalent_exponent(ratio) for ratio in renders.predicted])
     # The α of a Student-t lobe over Beckmann's m_B is the same at every roughness.
     beckmann, lobe = distribution("beckmann"), distribution("student-t")
@@ -222,12 +223,9 @@ def lights() -> PageFiles:
         power_law={exponent: best_ratio(exponent) for exponent in range(4)},
         costs=cost_table(renders),
         lowest=_LOWEST,
-        ends={name: int(np.sum(best == _LOWEST)) for name, best in renders.best.items()},
+        ends={name: int(np.sum(each == _LOWEST)) for name, each in best},
         signed={f"{m_b:g}": np.median(off[renders.m_b == m_b]) for m_b in np.unique(renders.m_b)},
-        rank={
-            name: spearmanr(renders.predicted, best).statistic
-            for name, best in renders.best.items()
-        },
+        rank={name: spearmanr(renders.predicted, each).statistic for name, each in best},
         exponent={"least": exponents.min(), "largest": exponents.max()},
         constants=_constant_table(constants),
         student=student,
@@ -238,10 +236,8 @@ def lights() -> PageFiles:
     )
     columns = {"m_b": renders.m_b, "predicted": renders.predicted, "exponent": exponents}
     columns |= {f"best {name}": ratio for name, ratio in renders.best.items()}
-    cases = [
-        {"environment": name} | row
-        for name, row in zip(renders.environment, rounded_rows(columns), strict=True)
-    ]
+    named = zip(renders.environment, rounded_rows(columns), strict=True)
+    cases = [{"environment": name} | row for name, row in named]
     rows = [one.record() for one in constants]
     tables = [csv_text(list(table[0]), table) for table in (cases, rows)]
     return PageFiles([page, *tables, draw_lights(renders, exponents, metrics)], figures)

@@ -74,9 +74,8 @@ def _compare(
         covering = [method for method in formulas if method.covers(source, target, metrics[0])]
         ours = [answers(method, parameter, source, target, metrics[0]) for method in covering]
         for metric in metrics:
-            reference = next(
-                one for one in map(method_named, _REFERENCES) if one.covers(source, target, metric)
-            )
+            references = map(method_named, _REFERENCES)
+            reference = next(one for one in references if one.covers(source, target, metric))
             best = answers(reference, parameter, source, target, metric)
             results = np.stack([best, *ours])
             off = np.abs(results / best - 1)

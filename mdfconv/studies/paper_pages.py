@@ -29,12 +29,8 @@ def table2() -> PageFiles:
     cells = list(paper_table.printed_cells(rows))
     missed = [cell for cell in cells if not cell["agrees"]]
     columns = [name for name in cells[0] if name != "agrees"]
-    figures = {
-        "agreeing": len(cells) - len(missed),
-        "cells": len(cells),
-        "missed": len(missed),
-        "tolerance": paper_table.AGREEMENT,
-    }
+    figures = {"cells": len(cells), "missed": len(missed), "tolerance": paper_table.AGREEMENT}
+    figures["agreeing"] = len(cells) - len(missed)
     table = markdown_text(paper_table.COLUMNS, rows)
     missed_table = markdown_text(columns, missed)
     page = fill("table2", table=table, missed_table=missed_table, **figures)
@@ -111,12 +107,9 @@ def pictures() -> PageFiles:
         comparison = spheres.compare(m_b, rules, scene)
         files += [draw_comparison(comparison, _FIGURE_DPI), csv_text(*comparison.section_rows())]
         rows += [{"figure": name} | row for row in comparison.table()]
+    first = [row for row in rows if row["conversion"] == rules[0].label]
     figures = {
-        name: {
-            row["distribution"]: row
-            for row in rows
-            if (row["figure"], row["conversion"]) == (name, rules[0].label)
-        }
+        name: {row["distribution"]: row for row in first if row["figure"] == name}
         for name in spheres.PAPER_FIGURES
     }
     columns = [name for name in rows[0] if not name.startswith("psnr")]

@@ -124,12 +124,8 @@ def findings(audited: str, cases: Iterable[HardCases]) -> Iterator[Finding]:
         groups.setdefault((each.rule, each.regime, each.values.dtype), []).append(each)
     for (rule, regime, dtype), members in groups.items():
         errors = np.concatenate([relative_errors(one.values, one.exact) for one in members])
-        printed = [
-            error
-            for one in members
-            if one.textbook is not None
-            for error in relative_errors(one.textbook, one.exact)
-        ]
+        compared = ((one.textbook, one.exact) for one in members if one.textbook is not None)
+        printed = [error for pair in compared for error in relative_errors(*pair)]
         worst = int(np.argmax(np.nan_to_num(errors, nan=np.inf)))
         textbook = float(np.max(printed)) if printed else None
         yield Finding(
@@ -329,10 +325,8 @@ def printed_conversion(
             # It holds the formulas as printed.
             result = method.convert(ConversionTask(source, values, target, metric_named("unit")))
         else:
-            first, last = (
-                getattr(end.printed, name)
-                for end, name in zip((source, target), _INVERTIBLE[method.name], strict=True)
-            )
+            ends = zip((source, target), _INVERTIBLE[method.name], strict=True)
+            first, last = (getattr(end.printed, name) for end, name in ends)
             if first is None or last is None:
                 return None
             result = last(first(values, *_gammas(source, values)), *_gammas(target, values))

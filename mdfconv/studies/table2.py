@@ -36,10 +36,8 @@ _BATCH = 64
 # What is fitted; column of the paper, and the distribution that fits it.
 _SOURCE = "beckmann"
 FITTED = {"n": "blinn-phong", "m_g": "gauss", "n_ds": "sawicki", "c_tr": "ggx"}
-COLUMNS = (
-    "m_b", "n_eq11", "rmse_n_eq11", "n", "rmse_n", "m_g", "rmse_m_g", "n_ds", "rmse_n_ds",
-    "c_tr", "rmse_c_tr",
-)  # fmt: skip
+_PAIRS = [name for column in FITTED for name in (column, f"rmse_{column}")]
+COLUMNS = ("m_b", "n_eq11", "rmse_n_eq11", *_PAIRS)
 
 Row = dict[str, float]
 

@@ -141,12 +141,11 @@ def convert_gltf(
     for each in materials:
         if not isclose(each.value, each.result, rel_tol=_SAME):
             document.set_factor(each.index, f"{each.result:.{_DIGITS}g}")
+    left = sorted(problems.items())
     return GltfConversion(
         data=document.encoded(),
         materials=tuple(sorted(materials, key=attrgetter("index"))),
-        problems=tuple(
-            MaterialProblem(f"materials[{at}]", *problems[at]) for at in sorted(problems)
-        ),
+        problems=tuple(MaterialProblem(f"materials[{at}]", *problem) for at, problem in left),
         files=changes.files if changes else {},
         inputs=changes.inputs if changes else (),
         generator=document.generator,

@@ -62,9 +62,8 @@ class GltfImages:
 
     def __init__(self, document: GltfDocument, folders: GltfTextures, ending: str) -> None:
         self._document, self._folders, self._ending = document, folders, ending
-        self.images, self._views, self._buffers = (
-            document.array(name) for name in ("images", "bufferViews", "buffers")
-        )
+        names = "images", "bufferViews", "buffers"
+        self.images, self._views, self._buffers = map(document.array, names)
         self.files: dict[Path, bytes] = {}
         self._read: dict[Path, bytes] = {}
 

@@ -120,11 +120,8 @@ class TextureConversion:
         if any("texture" in key.lower() or "image" in key.lower() for key, _ in extensions):
             return set(range(len(self._images.images)))
         # The occlusion has another channel of the same image.
-        free = {
-            id(material.get(_OCCLUSION))
-            for material in self._document.materials
-            if isinstance(material, dict)
-        }
+        objects = (each for each in self._document.materials if isinstance(each, dict))
+        free = {id(each.get(_OCCLUSION)) for each in objects}
         free |= {id(self._document.texture_of(at)) for at in self.notes}
         images = set()
         everything = self._document.everything

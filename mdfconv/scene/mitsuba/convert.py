@@ -169,15 +169,14 @@ def convert_mitsuba(
         for holder in bsdf.textures:
             textures[holder] = bitmaps[holder]
             edits.set_value(scene.bitmap_file(holder), attribute_text(bitmaps[holder].result))
+    left = [bsdf for bsdf in scene.bsdfs if bsdf.problem]
     return MitsubaConversion(
         data=edits.result(),
         materials=tuple(materials),
         textures=tuple(textures.values()),
         named=scene.named,
         includes=tuple((each.line, each.get("filename")) for each in scene.includes),
-        problems=tuple(
-            MaterialProblem(bsdf.element.line, bsdf.problem) for bsdf in scene.bsdfs if bsdf.problem
-        ),
+        problems=tuple(MaterialProblem(bsdf.element.line, bsdf.problem) for bsdf in left),
     )
 
 

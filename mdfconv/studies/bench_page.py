@@ -185,13 +185,9 @@ def draw(measurements: Measurements, dpi: int = 120) -> bytes:
     from matplotlib.ticker import LogLocator
 
     left, right = figure.subplots(1, 2)
+    variant = "for {reference} {reference_parameter:.4g}".format_map
     substitutes = [
-        _Point(
-            row["distribution"],
-            f"for {row['reference']} {row['reference_parameter']:.4g}",
-            row["ns_float32"],
-            row["rmse"],
-        )
+        _Point(row["distribution"], variant(row), row["ns_float32"], row["rmse"])
         for row in measurements.tables["substitutes"]
     ]
     methods = [

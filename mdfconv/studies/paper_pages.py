@@ -79,10 +79,8 @@ def errors() -> PageFiles:
     """Return Figures 1 and 2, and their maxima beside the paper's prose."""
     drawn = {name: curves(parameters) for name, parameters in spheres.PAPER_SETS.items()}
     maxima = [{"figure": name} | row for name, each in drawn.items() for row in each.maxima()]
-    pairs = {
-        n: {spheres.REFERENCE: convert(n, "blinn-phong", spheres.REFERENCE), "blinn-phong": n}
-        for n in _STATED
-    }
+    first = spheres.REFERENCE
+    pairs = {n: {first: convert(n, "blinn-phong", first), "blinn-phong": n} for n in _STATED}
     figures: dict[str, Any] = {name: _largest(each) for name, each in drawn.items()}
     figures["blinn_phong"] = {n: _largest(curves(pair))["blinn-phong"] for n, pair in pairs.items()}
     page = fill("errors", maxima=markdown_text(list(maxima[0]), maxima), **figures)

@@ -144,9 +144,8 @@ class MitsubaScene:
         ]
         # Of several of one name Mitsuba takes the first.
         self._defaults = {each.get("name"): each for each in reversed(by_tag["default"])}
-        self._textures = {
-            each.get("id"): each for each in reversed(by_tag["texture"]) if "id" in each.attributes
-        }
+        identified = [each for each in by_tag["texture"] if "id" in each.attributes]
+        self._textures = {each.get("id"): each for each in reversed(identified)}
         referred = Counter(each.get("id") for each in by_tag["ref"] + by_tag["alias"])
         self.uses = Counter({each: referred[name] for name, each in self._textures.items()})
         if by_tag["texture"]:

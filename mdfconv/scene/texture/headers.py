@@ -154,10 +154,8 @@ def _lacks(tags: dict[int, tuple[int, ...]], bits: int, size: int) -> bool:
         return False  # what decodes them will say
     line = ceil(across * samples * bits / 8)
     last = rows if tiled else height - rows * (down - 1)
-    return any(
-        length < line * (last if index % down == down - 1 else rows)
-        for index, length in enumerate(lengths)
-    )
+    least = [line * (last if index % down == down - 1 else rows) for index in range(len(lengths))]
+    return any(length < fewest for length, fewest in zip(lengths, least, strict=True))
 
 
 def _tiff_tags(path: Path) -> dict[int, tuple[int, ...]]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from mdfconv.cli import completion, options, tables
-from mdfconv.cli.options import Format
+from mdfconv.cli.options import Format, argument, flag, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
@@ -31,34 +31,30 @@ _CHIEF = ("file", "channel", "distribution", "parameter", "gamma", "rmse", "simp
 _SECOND = ("stderr", "error", "reflectance", "diffuse", "specular", "masking")
 
 
-def _column_option(what: str, otherwise: str = "") -> Any:
-    help_ = f"Column of {what}, by name or number from 1{otherwise}."
-    return typer.Option(metavar="COLUMN", help=help_)
+def _column(what: str, otherwise: str = "") -> Any:
+    return option("COLUMN", f"Column of {what}, by name or number from 1{otherwise}.")
 
 
 def command(
     data: Annotated[
         list[str],
-        typer.Argument(
-            metavar="DATA...",
-            help="Files of samples, or patterns such as '*.csv'; - is standard input.",
-        ),
+        argument("DATA...", "Files of samples, or patterns such as '*.csv'; - is standard input."),
     ],
     targets: Annotated[
         list[str] | None,
-        typer.Option(
-            "--to",
-            metavar="MDF",
-            autocompletion=completion.targets,
-            help="Distribution to fit, or the form in which its parameter is printed, such as "
+        option(
+            "MDF",
+            "Distribution to fit, or the form in which its parameter is printed, such as "
             "ggx:roughness; repeatable; default all.",
+            "--to",
+            words=completion.targets,
         ),
     ] = None,
     quantity: Annotated[
         Literal["ndf", "brdf"] | None,
         typer.Option(help="ndf (default for text), or brdf at θ_d ≈ 0 (default for MERL, ALTA)."),
     ] = None,
-    angle: Annotated[str | None, _column_option("angles", "; by default from the names")] = None,
+    angle: Annotated[str | None, _column("angles", "; by default from the names")] = None,
     angle_is: Annotated[
         Literal["half", "reflected", "incident"] | None,
         typer.Option(
@@ -66,36 +62,29 @@ def command(
             "or incident direction, the other along the normal."
         ),
     ] = None,
-    theta_i: Annotated[str | None, _column_option("the incident zenith")] = None,
-    phi_i: Annotated[str | None, _column_option("the incident azimuth")] = None,
-    theta_o: Annotated[str | None, _column_option("the outgoing zenith")] = None,
-    phi_o: Annotated[str | None, _column_option("the outgoing azimuth")] = None,
+    theta_i: Annotated[str | None, _column("the incident zenith")] = None,
+    phi_i: Annotated[str | None, _column("the incident azimuth")] = None,
+    theta_o: Annotated[str | None, _column("the outgoing zenith")] = None,
+    phi_o: Annotated[str | None, _column("the outgoing azimuth")] = None,
     angle_unit: Annotated[
         str | None,
-        typer.Option(
-            metavar="UNIT",
-            autocompletion=completion.angle_units,
-            help="degrees, radians or cosine; by default from the header.",
+        option(
+            "UNIT",
+            "degrees, radians or cosine; by default from the header.",
+            words=completion.angle_units,
         ),
     ] = None,
-    values: Annotated[
-        list[str] | None, typer.Option(metavar="COLUMN", help="Column of values; repeatable.")
-    ] = None,
+    values: Annotated[list[str] | None, option("COLUMN", "Column of values; repeatable.")] = None,
     cells: Annotated[
         int | None,
-        typer.Option(
-            metavar="N", min=1, help="Of a MERL file: N cells of the whole, not the slice θ_d ≈ 0."
-        ),
+        option("N", "Of a MERL file: N cells of the whole, not the slice θ_d ≈ 0.", min=1),
     ] = None,
     max_angle: Annotated[
         float | None,
-        typer.Option(
-            metavar="DEG", help="Leave out larger angles; 80 by default for brdf at θ_d ≈ 0."
-        ),
+        option("DEG", "Leave out larger angles; 80 by default for brdf at θ_d ≈ 0."),
     ] = None,
     separate: Annotated[
-        bool,
-        typer.Option("--separate", help="Fit every channel on its own, not with one parameter."),
+        bool, flag("--separate", "Fit every channel on its own, not with one parameter.")
     ] = False,
     loss: Annotated[
         Literal["linear", "log", "cosine"],
@@ -113,34 +102,32 @@ def command(
     ] = None,
     fresnel: Annotated[
         str | None,
-        typer.Option(
-            metavar="F",
-            autocompletion=completion.fresnel_factors,
-            help="Of two directions: none (default), schlick (F₀ 0.04), ior:N, or fit (F₀ free).",
+        option(
+            "F",
+            "Of two directions: none (default), schlick (F₀ 0.04), ior:N, or fit (F₀ free).",
+            words=completion.fresnel_factors,
         ),
     ] = None,
     robust: Annotated[
-        bool, typer.Option("--robust", help="Of two directions: let outliers count less.")
+        bool, flag("--robust", "Of two directions: let outliers count less.")
     ] = False,
     gamma: Annotated[
         str | None,
-        typer.Option(
-            metavar="G",
-            help="Second parameter, of gtr and student-t, as a number that is kept; free, or not "
+        option(
+            "G",
+            "Second parameter, of gtr and student-t, as a number that is kept; free, or not "
             "given, it is fitted.",
         ),
     ] = None,
     tolerance: Annotated[
-        float, typer.Option(metavar="T", help="How much worse than the best the simplest may be.")
+        float, option("T", "How much worse than the best the simplest may be.")
     ] = 0.05,
     format_: options.FormatOption = None,
     output: options.OutputOption = None,
     png: options.PngOption = None,
     report: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="Write a page for a colleague: .html, or .md with its pictures."
-        ),
+        option("FILE", "Write a page for a colleague: .html, or .md with its pictures."),
     ] = None,
     force: options.ForceOption = False,
 ) -> None:

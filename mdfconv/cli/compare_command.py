@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from mdfconv.cli import completion, options
+from mdfconv.cli import completion, options, process, tables
 from mdfconv.cli.options import argument, option
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
-from mdfconv.cli.process import tell
-from mdfconv.cli.tables import form_of, write_table
 from mdfconv.distributions import one_parameter_distributions
 from mdfconv.distributions.endpoint import Endpoint, one_parameter_endpoint
 from mdfconv.errors import MdfconvError
@@ -167,7 +165,7 @@ def command(
         contents[folder / f"{name}.csv"] = file_bytes(csv_text(columns, section))
         contents[folder / f"{name}.png"] = draw_comparison(comparison, dpi)
     outputs.write(contents)
-    form = form_of(format_)
+    form = tables.form_of(format_)
     if form == "table":
         # People read parameters with their symbols.
         texts = {target.label: target.text for target in ends}
@@ -175,7 +173,7 @@ def command(
             row["parameter"] = texts[row["distribution"]](row["parameter"])
     compared = " and ".join(map(end.text, surfaces.values()))
     title = f"Pictures against those of {end.label}, {compared}"
-    write_table(_COLUMNS, rows, form, title=title)
+    tables.write_table(_COLUMNS, rows, form, title=title)
 
 
 def _words(scene: Scene, rules: Sequence[PictureRule], targets: Sequence[str]) -> list[str]:
@@ -233,7 +231,7 @@ def _answering(
     if len(refusals) == len(ends):
         raise next(iter(refusals.values()))
     for refusal in refusals.values():
-        tell(f"left out: {refusal}")
+        process.tell(f"left out: {refusal}")
     return [end for end in ends if end.label not in refusals]
 
 

@@ -12,9 +12,8 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from mdfconv.cli import options, tables
+from mdfconv.cli import options, process, tables
 from mdfconv.cli.options import argument
-from mdfconv.cli.process import tell
 from mdfconv.conversion import Conversion, explain, list_methods
 from mdfconv.conversion.explanation import explained
 from mdfconv.conversion.values import FREE, ConversionRule, Gamma, Value, holds_pairs
@@ -99,7 +98,7 @@ def command(
     if refusals and (not every or not groups):
         raise refusals[0]
     for refusal in refusals:
-        tell(f"left out: {refusal}")
+        process.tell(f"left out: {refusal}")
     conversions = [conversion for group in groups for conversion in group]
     if form == "plain":
         _write_plain(conversions, named=every, free=free)
@@ -243,7 +242,7 @@ def _tell_new(cautions: Iterable[str], told: set[str]) -> None:
     """Tell each caution that has not been told yet."""
     for caution in cautions:
         if caution not in told:
-            tell(f"note: {caution}")
+            process.tell(f"note: {caution}")
             told.add(caution)
 
 

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from mdfconv.cli import completion, options, tables
+from mdfconv.cli import completion, options, process, tables
 from mdfconv.cli.options import Format, argument, flag, option
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import cell_text
 from mdfconv.registry import ALL
@@ -267,12 +266,12 @@ def _tell(analysis: Analysis, tolerance: float, *, named: bool) -> None:
     """Write notes and verdicts to standard error."""
     file = f"{analysis.name}: " if named else ""
     for note in analysis.notes:
-        tell(f"{file}note: {note}")
+        process.tell(f"{file}note: {note}")
     for result in analysis.results:
         channels = result.samples.channels
         channel = f"channel {channels[0]}: " if len(analysis.results) > 1 else ""
         cheap = result.simplest.distribution
-        tell(
+        process.tell(
             f"{file}{channel}best is {result.fits[0].distribution.name}; simplest within "
             f"{100 * tolerance:g} % of its error is {cheap.name}, at {cheap.operations} "
             "operations an evaluation"
@@ -297,5 +296,5 @@ def _targets(ends: Sequence[Endpoint], gamma: float | None) -> list[Distribution
     targets = fitted_distributions(named, gamma)
     for mdf in () if named else fitted_distributions(None, None):
         if mdf not in targets:
-            tell(f"note: {mdf.name} is left out: it has no γ = {gamma:g}")
+            process.tell(f"note: {mdf.name} is left out: it has no γ = {gamma:g}")
     return targets

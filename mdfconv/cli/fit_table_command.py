@@ -6,10 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from mdfconv.cli import options
+from mdfconv.cli import options, tables
 from mdfconv.cli.options import flag, option
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.tables import progress, write_table
 from mdfconv.distributions import distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import percent_hint
@@ -92,11 +91,11 @@ def command(
         from mdfconv.studies.table2 import fit_table
 
         values, limit = _sweep(sweep, m_b)
-        with progress("Fitting", values.size) as advance:
+        with tables.progress("Fitting", values.size) as advance:
             rows = fit_table(values, limit, chosen, extended=extended, progress=advance)
         title = f"Fits of Beckmann, metric {chosen}"
         minor = [name for name in rows[0] if name.startswith("rmse")]
-    write_table(list(rows[0]), rows, format_, outputs, title=title, secondary=minor)
+    tables.write_table(list(rows[0]), rows, format_, outputs, title=title, secondary=minor)
 
 
 def _sweep(sweep: str | None, m_b: list[float] | None) -> tuple[Array, Array]:

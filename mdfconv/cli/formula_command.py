@@ -6,9 +6,8 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion, options
+from mdfconv.cli import completion, options, tables
 from mdfconv.cli.options import flag, option
-from mdfconv.cli.tables import write_table
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 
@@ -85,7 +84,7 @@ def command(
             }
             for formula in pareto_front(problem)
         ]
-        write_table(_COLUMNS, rows, format_, title=title)
+        tables.write_table(_COLUMNS, rows, format_, title=title)
     else:
         typer.echo(write_formula(cheapest(problem, tolerance), problem, language))
 

@@ -6,10 +6,9 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion, options
+from mdfconv.cli import completion, options, tables
 from mdfconv.cli.options import argument, option
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.tables import write_table
 from mdfconv.errors import MdfconvError
 
 _MOST_POINTS = 1001
@@ -108,7 +107,7 @@ def command(
         curve = {label: [row["albedo"] for row in rows]}
         picture[png] = draw_albedo([row["cos_theta"] for row in rows], {"": curve})
     title = f"White furnace: {label}"
-    write_table(list(rows[0]), rows, format_, outputs, beside=picture, title=title)
+    tables.write_table(list(rows[0]), rows, format_, outputs, beside=picture, title=title)
 
 
 def _decoded(brdf: str, value: float) -> tuple[str, float]:

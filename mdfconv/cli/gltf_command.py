@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion, material_files, options
+from mdfconv.cli import completion, material_files, options, process
 from mdfconv.cli.options import argument, flag, option
-from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
 
 _HEADINGS = {
@@ -117,7 +116,7 @@ def command(
             )
         proposals = _proposals(conversion.generator)
         if proposals and dialect not in proposals:
-            tell(
+            process.tell(
                 f"note: {destination.source} was written by '{conversion.generator}', which stands "
                 f"for {' or '.join(proposals.values())}"
             )

@@ -7,10 +7,9 @@ from typing import Annotated
 
 import typer
 
+from mdfconv.cli import process, tables
 from mdfconv.cli.options import ForceOption, FormatOption, PngOption, argument, option
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.process import tell
-from mdfconv.cli.tables import console, form_of, write_table
 from mdfconv.output.records import csv_text, json_text
 
 _ROUGHNESSES = (0.05, 0.1, 0.2, 0.4)
@@ -55,12 +54,12 @@ def command(
     if png:
         contents[png] = draw_spectrum(report.spectrum, map_.name)
     outputs.write(contents)
-    form = form_of(format_)
+    form = tables.form_of(format_)
     if form == "json":
         light = {"exponent": report.spectrum.exponent, "softness": report.softness}
         lists = {"conversions": rows, "spectrum": degrees}
         typer.echo(json_text({"map": str(map_), **light, **lists}))
         return
-    write_table(list(rows[0]), rows, form, title="α of the best GGX for Beckmann's m_B")
-    say = console().print if form == "table" else tell
+    tables.write_table(list(rows[0]), rows, form, title="α of the best GGX for Beckmann's m_B")
+    say = tables.console().print if form == "table" else process.tell
     say(report.sentence)

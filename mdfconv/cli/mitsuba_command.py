@@ -8,9 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from mdfconv.cli import completion, material_files, options
+from mdfconv.cli import completion, material_files, options, process
 from mdfconv.cli.options import argument, flag, option
-from mdfconv.cli.process import tell
 
 _HEADINGS = {
     "name": "BSDF", "line": "line", "distribution": "from", "value": "α", "result": "new α",
@@ -112,4 +111,4 @@ def _print_more(record: dict[str, Any]) -> None:
         )
     for include in record["includes"]:
         place = f"{record['file']}:{include['line']}"
-        tell(f"{place}: {include['file']} is included, and is not read: convert it, too")
+        process.tell(f"{place}: {include['file']} is included, and is not read: convert it, too")

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion, material_files, options
+from mdfconv.cli import completion, material_files, options, tables
 from mdfconv.cli.options import argument, flag, option
-from mdfconv.cli.tables import progress
 from mdfconv.errors import MdfconvError
 
 _HEADINGS = {
@@ -82,7 +81,7 @@ def command(
         names: dict[str, str] | None = None
         problems: list[MaterialProblem] = []
         if textures:
-            names, problems = library.convert_library_textures(data, folder, rule, progress)
+            names, problems = library.convert_library_textures(data, folder, rule, tables.progress)
         with material_files.about(destination.source):
             conversion = library.convert_mtl(
                 data, to, metric=chosen, replace=replace, texture_names=names

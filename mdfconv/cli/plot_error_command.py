@@ -7,10 +7,9 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion, options
+from mdfconv.cli import completion, options, tables
 from mdfconv.cli.options import flag, option
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
-from mdfconv.cli.tables import write_table
 from mdfconv.distributions import one_parameter_distribution
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
@@ -93,7 +92,7 @@ def command(
             {"figure": name} | row for row in options.in_asked_forms(drawn.maxima(), endpoints)
         ]
     title = f"Largest error against {reference}"
-    write_table(_COLUMNS, rows, format_, outputs, beside=contents, title=title)
+    tables.write_table(_COLUMNS, rows, format_, outputs, beside=contents, title=title)
 
 
 def _parameter_sets(

@@ -6,10 +6,9 @@ from typing import Annotated, Literal
 
 import typer
 
-from mdfconv.cli import completion
+from mdfconv.cli import completion, tables
 from mdfconv.cli.options import ForceOption, FormatOption, OutputOption, option
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.tables import write_table
 
 # Of a table in a narrow terminal.
 _SECONDARY = ("textbook", "worst", "error_in_eps", "cases", "out_of_range")
@@ -49,4 +48,4 @@ def command(
     outputs = Outputs(table=output, force=force)
     rows = [finding.record() for finding in audit(mdf or (), part)]
     title = "Hard cases: worst relative errors"
-    write_table(COLUMNS, rows, format_, outputs, title=title, secondary=_SECONDARY)
+    tables.write_table(COLUMNS, rows, format_, outputs, title=title, secondary=_SECONDARY)

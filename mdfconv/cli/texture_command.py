@@ -7,11 +7,9 @@ from typing import Annotated, Literal
 
 import typer
 
-from mdfconv.cli import completion, options
+from mdfconv.cli import completion, options, process, tables
 from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.process import tell
-from mdfconv.cli.tables import progress
 
 
 def command(
@@ -97,7 +95,7 @@ def command(
             dither=dither,
             lossy=lossy,
             max_pixels=max_pixels,
-            progress=progress,
+            progress=tables.progress,
             fill=files.fill,
         )
         if png:
@@ -105,11 +103,11 @@ def command(
 
             files.add(png, draw_histograms(report, f"{source_file.name} → {output.name}"))
     for note in report.notes():
-        tell(f"note: {note}")
+        process.tell(f"note: {note}")
     keeps = f"keeps the {report.keeps}" if report.keeps else "the same lobes"
-    tell(f"wrote {output}: {report.target}, {keeps}")
+    process.tell(f"wrote {output}: {report.target}, {keeps}")
     if png:
-        tell(f"wrote {png}")
+        process.tell(f"wrote {png}")
 
 
 def _check_given(context: typer.Context, *names: str) -> None:

@@ -8,14 +8,11 @@ of the authors' loader), φ along the first axis.
 from __future__ import annotations
 
 import math
-import mmap
 import struct
-from pathlib import Path
 
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
-from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source
 from mdfconv.measured.samples import Samples, samples
 
@@ -35,10 +32,8 @@ def _read(source: Source, options: ReadOptions) -> Samples:
     wanted = _fields(source)
     density = wanted.get("ndf")
     if density is None or density.ndim != 2 or min(density.shape) < 1 or density.shape[1] < 2:
-        raise MdfconvError(
-            f"{source.path}: no table 'ndf', the distribution of normals, with two axes",
-            f"there are {', '.join(wanted) or 'none'}",
-        )
+        reason = "no table 'ndf', the distribution of normals, with two axes"
+        raise source.error(reason, f"there are {', '.join(wanted) or 'none'}")
     theta = (np.arange(density.shape[1]) / (density.shape[1] - 1)) ** 2 * (np.pi / 2)
     values = _around(density.astype(float))
     notes = ["the measured distribution of normals is read, not the reflectance"]
@@ -66,22 +61,19 @@ def _fields(source: Source) -> dict[str, Array]:
     MdfconvError
         If the file is truncated or of another version.
     """
-    path, content = source.path, source.content
-    position = len(_SIGNATURE)
-    (*version, count), position = _unpack(path, content, "<BBI", position)
+    content, position = source.content, len(_SIGNATURE)
+    (*version, count), position = _unpack(source, "<BBI", position)
     if tuple(version) != _VERSION:
-        raise MdfconvError(
-            f"{path}: tensor file of version {version[0]}.{version[1]}", "only 1.0 is read"
-        )
+        raise source.error(f"tensor file of version {version[0]}.{version[1]}", "only 1.0 is read")
     fields = {}
     for _ in range(count):
-        (length,), position = _unpack(path, content, "<H", position)
+        (length,), position = _unpack(source, "<H", position)
         name = content[position : position + length].decode("ascii", errors="backslashreplace")
         name = name if name.isprintable() else repr(name)
-        (dimensions, kind, offset), position = _unpack(path, content, "<HBQ", position + length)
+        (dimensions, kind, offset), position = _unpack(source, "<HBQ", position + length)
         if dimensions > _MOST_DIMENSIONS:
-            raise MdfconvError(f"{path}: damaged: table '{name}' has {dimensions} axes")
-        shape, position = _unpack(path, content, f"<{dimensions}Q", position)
+            raise source.error(f"damaged: table '{name}' has {dimensions} axes")
+        shape, position = _unpack(source, f"<{dimensions}Q", position)
         fields[name] = _table(source, name, shape, kind, offset)
     return fields
 
@@ -89,22 +81,20 @@ def _fields(source: Source) -> dict[str, Array]:
 def _table(source: Source, name: str, shape: tuple[int, ...], kind: int, offset: int) -> Array:
     form = _TYPES[kind] if kind < len(_TYPES) else None
     if form is None:
-        raise MdfconvError(f"{source.path}: damaged: table '{name}' is of unknown type {kind}")
+        raise source.error(f"damaged: table '{name}' is of unknown type {kind}")
     count = math.prod(shape)
     if offset + count * np.dtype(form).itemsize > len(source.content):
-        raise MdfconvError(f"{source.path}: truncated: table '{name}' goes beyond its end")
+        raise source.error(f"truncated: table '{name}' goes beyond its end")
     if not count:
         return np.zeros(0)
     return np.frombuffer(source.content, form, count, offset).reshape(shape)
 
 
-def _unpack(
-    path: Path, content: bytes | mmap.mmap, form: str, position: int
-) -> tuple[tuple[int, ...], int]:
+def _unpack(source: Source, form: str, position: int) -> tuple[tuple[int, ...], int]:
     size = struct.calcsize(form)
-    part = content[position : position + size]
+    part = source.content[position : position + size]
     if len(part) < size:
-        raise MdfconvError(f"{path}: truncated within its table of contents")
+        raise source.error("truncated within its table of contents")
     return struct.unpack(form, part), position + size
 
 

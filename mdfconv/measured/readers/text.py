@@ -10,16 +10,11 @@ import numpy as np
 
 from mdfconv.brdf.microfacet import mirrored, polar_angle
 from mdfconv.distributions.evaluation import Array
+from mdfconv.measured import samples
 from mdfconv.measured.readers import tables
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source
 from mdfconv.measured.readers.tables import Role, Table, parse_table
-from mdfconv.measured.samples import (
-    UNITS,
-    DirectionalSamples,
-    Measurements,
-    directional_samples,
-    samples,
-)
+from mdfconv.measured.samples import UNITS, DirectionalSamples, Measurements
 from mdfconv.registry import unknown_name
 
 # What an angle of a table of one angle can be.
@@ -100,7 +95,9 @@ class _Columns:
         light = angles[Role.theta_i], angles[Role.phi_i]
         view = angles[Role.theta_o], angles[Role.phi_o]
         notes = (*self._notes, *value_notes)
-        return _oriented(directional_samples(table.path, *light, *view, values, channels, notes))
+        return _oriented(
+            samples.directional_samples(table.path, *light, *view, values, channels, notes)
+        )
 
     def one_angle(self) -> Measurements:
         """Return samples of one angle, or of two directions of which one is the normal."""
@@ -121,14 +118,14 @@ class _Columns:
                 "normal"
             )
             first, second = (theta, zero) if meaning == INCIDENT else (zero, theta)
-            return directional_samples(
+            return samples.directional_samples(
                 table.path, first, zero, second, zero, values, channels, (*notes, note)
             )
         if not (table.is_named and tables.is_half(table.names[column])):
             other = "" if meaning else ", not of a direction"
             read = f"{table.listed([column])} is read as the angle between normal and half vector"
             notes += (read + other,)
-        return samples(table.path, angle, unit, values, channels, "ndf", notes)
+        return samples.samples(table.path, angle, unit, values, channels, "ndf", notes)
 
     def _by_role(self) -> dict[Role, int]:
         """Return the columns of angles by what they hold."""
@@ -309,38 +306,38 @@ class _Columns:
         self._notes.append(note)
 
 
-def _oriented(samples: DirectionalSamples) -> DirectionalSamples:
+def _oriented(data: DirectionalSamples) -> DirectionalSamples:
     """Return samples with the incident directions turned by 180° if the lobe lies there.
 
     Azimuths of incidence are taken to be those towards the light; a note says if the file turned
     out otherwise, or left it open.
     """
-    turned = replace(samples, incident=mirrored(samples.incident))
-    advantage = _fall(turned) - _fall(samples)
+    turned = replace(data, incident=mirrored(data.incident))
+    advantage = _fall(turned) - _fall(data)
     if advantage < -_CLEAR:
         note = (
             "the lobe lies where incident and outgoing azimuth are the same: the azimuth of "
             "incidence is that of the light's travel and is turned by 180°"
         )
-        return replace(turned, notes=(*samples.notes, note))
-    is_oblique = np.hypot(*samples.incident[:, :2].T).max() > 1e-6
+        return replace(turned, notes=(*data.notes, note))
+    is_oblique = np.hypot(*data.incident[:, :2].T).max() > 1e-6
     if advantage > _CLEAR or not is_oblique:
-        return samples
+        return data
     note = (
         "the values do not tell on which side the mirror direction lies: it is taken to be "
         "opposite to the azimuth of incidence"
     )
-    return replace(samples, notes=(*samples.notes, note))
+    return replace(data, notes=(*data.notes, note))
 
 
-def _fall(samples: DirectionalSamples) -> float:
+def _fall(data: DirectionalSamples) -> float:
     """Return how far the values gather at a small angle of the half vector: negative if so.
 
     It is the mean angle with the values as weights, every channel as much, less the one without,
     in standard deviations.
     """
-    beta = polar_angle(samples.half)
-    positive = np.maximum(samples.values, 0)
+    beta = polar_angle(data.half)
+    positive = np.maximum(data.values, 0)
     largest = positive.max(axis=0)
     weight = np.sum(positive / np.where(largest > 0, largest, 1), axis=1)
     spread = float(np.std(beta))

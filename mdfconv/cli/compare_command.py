@@ -242,10 +242,8 @@ def _surfaces(source: Endpoint, values: list[float] | None) -> Mapping[str, floa
     if values:
         return {f"compare-{source.label}-{value_name(value)}": value for value in values}
     if source.label != _REFERENCE:
-        raise MdfconvError(
-            f"the {source.stored.name} {source.stored.symbol} of {source.label} is missing",
-            "give it as VALUE",
-        )
+        missing = f"the {source.stored.name} {source.stored.symbol} of {source.label}"
+        raise MdfconvError(f"{missing} is missing", "give it as VALUE")
     return PAPER_FIGURES
 
 

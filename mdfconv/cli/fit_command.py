@@ -213,10 +213,8 @@ def _analysis(
 
     samples = read(path, columns)
     if needs_two and isinstance(samples, Samples):
-        raise MdfconvError(
-            f"{path}: --masking, --fresnel, --robust and --loss cosine need two directions",
-            "this file has one angle",
-        )
+        reason = "--masking, --fresnel, --robust and --loss cosine need two directions"
+        raise MdfconvError(f"{path}: {reason}", "this file has one angle")
     return fit(samples, name=path.name, **settings)
 
 

@@ -95,10 +95,8 @@ def command(
     if not textures:
         options.refuse_given(context, ["lossy"], "goes with --textures")
     if source is None:
-        raise MdfconvError(
-            "the rule by which the factors were stored is missing: give --from",
-            "--guess proposes one",
-        )
+        reason = "the rule by which the factors were stored is missing: give --from"
+        raise MdfconvError(reason, "--guess proposes one")
     chosen = options.chosen_metric(metric, exposure)
     names = with_specular(source, target or ROUGHNESS, specular)
     # A mistake in the names is none of a file.
@@ -148,10 +146,8 @@ def _check_form(source: Path, output: Path, data: bytes) -> None:
     form = ".glb" if is_glb(data) else ".gltf"
     named = output.suffix.lower()
     if output.name != source.name and named in {".glb", ".gltf"} - {form}:
-        raise MdfconvError(
-            f"{source} stays {form[1:]} in its form, {output} says {named[1:]}",
-            f"name it {output.with_suffix(form)}",
-        )
+        reason = f"{source} stays {form[1:]} in its form, {output} says {named[1:]}"
+        raise MdfconvError(reason, f"name it {output.with_suffix(form)}")
 
 
 def _proposals(generator: str) -> dict[str, str]:

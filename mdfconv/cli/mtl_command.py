@@ -86,11 +86,9 @@ def command(
             conversion = library.convert_mtl(
                 data, to, metric=chosen, replace=replace, texture_names=names
             )
+        problems += conversion.problems
         return dataclasses.replace(
-            conversion,
-            files=folder.files,
-            inputs=folder.inputs,
-            problems=(*problems, *conversion.problems),
+            conversion, files=folder.files, inputs=folder.inputs, problems=tuple(problems)
         )
 
     report = material_files.MaterialReport(

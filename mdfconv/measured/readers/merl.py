@@ -34,11 +34,8 @@ def _cells(source: Source, count: int) -> DirectionalSamples:
     planes = _planes(source)
     _, half, difference, azimuth = planes.shape
     generator = np.random.default_rng(_SEED)
-    theta_d, phi_d = np.meshgrid(
-        np.arange(difference) / difference * (np.pi / 2),
-        np.arange(azimuth) / azimuth * np.pi,
-        indexing="ij",
-    )
+    axes = np.arange(difference) / difference * (np.pi / 2), np.arange(azimuth) / azimuth * np.pi
+    theta_d, phi_d = np.meshgrid(*axes, indexing="ij")
     zero = np.zeros(1)
     wanted = max(1, -(-count // half))
     directions, values = [], []

@@ -72,10 +72,8 @@ class _Columns:
         incidence = None if Role.theta_i in columns else self._incidence()
         if Role.theta_o not in columns or not (Role.theta_i in columns or incidence):
             if any(getattr(self._options, role.name) for role in _DIRECTIONS):
-                raise table.error(
-                    "no column of the zenith of both directions",
-                    f"name both; there are {', '.join(table.names)}",
-                )
+                hint = f"name both; there are {', '.join(table.names)}"
+                raise table.error("no column of the zenith of both directions", hint)
             return None
         channels, values, value_notes = self._values(columns.values())
         unit = self._unit_of_directions(columns)
@@ -113,14 +111,11 @@ class _Columns:
             theta = UNITS[unit].to_radians(angle)
             zero = np.zeros_like(theta)
             still = INCIDENT if meaning == REFLECTED else REFLECTED
-            note = (
-                f"the angle is that of the {meaning} direction; the {still} one is taken to be the "
-                "normal"
-            )
-            first, second = (theta, zero) if meaning == INCIDENT else (zero, theta)
-            return samples.directional_samples(
-                table.path, first, zero, second, zero, values, channels, (*notes, note)
-            )
+            taken = f"the {still} one is taken to be the normal"
+            notes += (f"the angle is that of the {meaning} direction; {taken}",)
+            zeniths = (theta, zero) if meaning == INCIDENT else (zero, theta)
+            angles = zeniths[0], zero, zeniths[1], zero
+            return samples.directional_samples(table.path, *angles, values, channels, notes)
         if not (table.is_named and tables.is_half(table.names[column])):
             other = "" if meaning else ", not of a direction"
             read = f"{table.listed([column])} is read as the angle between normal and half vector"
@@ -140,11 +135,9 @@ class _Columns:
             if role is Role.angle:
                 bare.append(index)
             elif role in columns:
-                raise table.error(
-                    f"{table.listed([columns[role], index])} are both the {role}",
-                    "choose one",
-                    argument=role.name if role in _DIRECTIONS else "",
-                )
+                both = table.listed([columns[role], index])
+                argument = role.name if role in _DIRECTIONS else ""
+                raise table.error(f"{both} are both the {role}", "choose one", argument=argument)
             else:
                 columns[role] = index
         if Role.theta_i in columns and Role.theta_o not in columns and len(bare) == 1:
@@ -160,11 +153,9 @@ class _Columns:
         several = len(table.names) > 2
         if not table.is_named:
             if several and tables.is_counting(table.numbers[:, 0]):
-                raise table.error(
-                    "column 1 counts 0, 1, 2 … or 1, 2, 3 …: an index, or degrees",
-                    f"choose the column of angles, from 1 to {len(table.names)}",
-                    argument="angle",
-                )
+                reason = "column 1 counts 0, 1, 2 … or 1, 2, 3 …: an index, or degrees"
+                hint = f"choose the column of angles, from 1 to {len(table.names)}"
+                raise table.error(reason, hint, argument="angle")
             self._notes += ["no names of columns: the first is taken for the angle"] * several
             return 0
         angles = [index for index, name in self._names.items() if tables.is_angle(name)]
@@ -173,12 +164,9 @@ class _Columns:
         rest = [index for index in self._names if index not in self._counting]
         others = [index for index in rest[1:] if not tables.is_value(table.names[index])]
         if angles or not rest or (len(rest) > 2 and others):
-            raise table.error(
-                f"{'several columns are' if angles else 'no column is'} called an angle; "
-                f"there are {', '.join(table.names)}",
-                "choose the column of angles",
-                argument="angle",
-            )
+            which = "several columns are" if angles else "no column is"
+            reason = f"{which} called an angle; there are {', '.join(table.names)}"
+            raise table.error(reason, "choose the column of angles", argument="angle")
         self._notes.append(f"{table.listed(rest[:1])} is taken for the angle")
         return rest[0]
 
@@ -193,20 +181,16 @@ class _Columns:
         for index, name in self._names.items():
             different = np.unique(table.numbers[:, index]).size
             if tables.is_wavelength(name) and different > 1:
-                raise table.error(
-                    f"column '{name}' has {different} wavelengths, whose values would be mixed",
-                    "keep the rows of one",
-                )
+                reason = f"column '{name}' has {different} wavelengths, whose values would be mixed"
+                raise table.error(reason, "keep the rows of one")
         if self._options.values:
             return [table.column(name) for name in self._options.values], []
         counting = [index for index in self._counting if index not in angles]
         rest = [index for index in range(len(table.names)) if index not in (*angles, *counting)]
         chosen = [index for index in rest if tables.is_value(self._names.get(index, ""))] or rest
         if not chosen:
-            raise table.error(
-                f"{'one column is' if len(table.names) == 1 else 'the columns are'} not enough",
-                "it takes an angle and a value",
-            )
+            which = "one column is" if len(table.names) == 1 else "the columns are"
+            raise table.error(f"{which} not enough", "it takes an angle and a value")
         remark = "counts the rows and is passed over"
         notes = [f"column '{table.names[index]}' {remark}" for index in counting]
         others = [index for index in rest if index not in chosen]

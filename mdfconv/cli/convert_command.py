@@ -32,16 +32,15 @@ _BLOCK = 1 << 21
 # As a pair this is no surface: one of its axes would be a mirror.
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?0,\d+\s*\Z")
 
+_VALUES = argument(
+    "VALUE...",
+    "Parameters of the source; a pair X,Y for an anisotropic surface; - reads "
+    "values from standard input, one a line.",
+)
+
 
 def command(
-    values: Annotated[
-        list[str],
-        argument(
-            "VALUE...",
-            "Parameters of the source; a pair X,Y for an anisotropic surface; - reads "
-            "values from standard input, one a line.",
-        ),
-    ],
+    values: Annotated[list[str], _VALUES],
     source: options.FromOption,
     target: options.ToOption,
     method: options.MethodOption = None,

@@ -16,42 +16,35 @@ _MOST_SAMPLES = 10_000_000
 # Samples at all points together: some seconds.
 _MOST_DIRECTIONS = 100_000_000
 
+_PARAMETER = argument("PARAMETER", "Exponent of the Phong BRDFs, α of the others.")
+_BRDF = option(
+    "BRDF",
+    "phong, modified-phong, ggx, beckmann, smoothie, smoothie-approx or "
+    "ashikhmin-shirley; ggx:roughness takes PARAMETER for a stored form of α.",
+    words=completion.furnace_brdfs,
+)
+_NORMALIZER = option(
+    "NAME",
+    "Of modified-phong: usual (the default), arvo (integer exponents) or mallett-yuksel.",
+    words=completion.normalizers,
+)
+_MASKING = option(
+    "G",
+    "Of ggx and beckmann: correlated (the default), separable, v-cavity, ksk or none.",
+    "--g",
+    words=completion.maskings,
+)
+_SAMPLES = option("N", "Estimate by N random directions a cosine, too.", "--mc")
+
 
 def command(
     context: typer.Context,
-    parameter: Annotated[
-        float, argument("PARAMETER", "Exponent of the Phong BRDFs, α of the others.")
-    ],
-    brdf: Annotated[
-        str,
-        option(
-            "BRDF",
-            "phong, modified-phong, ggx, beckmann, smoothie, smoothie-approx or "
-            "ashikhmin-shirley; ggx:roughness takes PARAMETER for a stored form of α.",
-            words=completion.furnace_brdfs,
-        ),
-    ] = "ggx",
-    normalizer: Annotated[
-        str | None,
-        option(
-            "NAME",
-            "Of modified-phong: usual (the default), arvo (integer exponents) or mallett-yuksel.",
-            words=completion.normalizers,
-        ),
-    ] = None,
-    masking: Annotated[
-        str | None,
-        option(
-            "G",
-            "Of ggx and beckmann: correlated (the default), separable, v-cavity, ksk or none.",
-            "--g",
-            words=completion.maskings,
-        ),
-    ] = None,
+    parameter: Annotated[float, _PARAMETER],
+    brdf: Annotated[str, _BRDF] = "ggx",
+    normalizer: Annotated[str | None, _NORMALIZER] = None,
+    masking: Annotated[str | None, _MASKING] = None,
     points: Annotated[int, option("N", "Cosines of the viewer, from 0 to 1.")] = 21,
-    samples: Annotated[
-        int | None, option("N", "Estimate by N random directions a cosine, too.", "--mc")
-    ] = None,
+    samples: Annotated[int | None, _SAMPLES] = None,
     seed: Annotated[int, option("S", "Of the random numbers.")] = 0,
     png: options.PngOption = None,
     format_: options.FormatOption = None,

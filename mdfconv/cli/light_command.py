@@ -14,15 +14,13 @@ from mdfconv.output.records import csv_text, json_text
 
 _ROUGHNESSES = (0.05, 0.1, 0.2, 0.4)
 
+_MAP = argument("MAP", "Environment map, linear, 2:1: OpenEXR, Radiance .hdr or another picture.")
+_M_B = option("M", "Beckmann's m_B; repeatable; by default 0.05 to 0.4.")
+
 
 def command(
-    map_: Annotated[
-        Path,
-        argument("MAP", "Environment map, linear, 2:1: OpenEXR, Radiance .hdr or another picture."),
-    ],
-    m_b: Annotated[
-        list[float] | None, option("M", "Beckmann's m_B; repeatable; by default 0.05 to 0.4.")
-    ] = None,
+    map_: Annotated[Path, _MAP],
+    m_b: Annotated[list[float] | None, _M_B] = None,
     spectrum: Annotated[Path | None, option("FILE", "Write the spectrum as CSV.", "--csv")] = None,
     png: PngOption = None,
     force: ForceOption = False,

@@ -21,11 +21,11 @@ _FOOTNOTE = (
     "makes of a surface that is none."
 )
 
+_ENCODINGS = flag("--encodings", "List what follows a colon: how files and programs store it.")
+
 
 def command(
-    encodings: Annotated[
-        bool, flag("--encodings", "List what follows a colon: how files and programs store it.")
-    ] = False,
+    encodings: Annotated[bool, _ENCODINGS] = False,
     metric: options.OptionalMetricOption = None,
     exposure: options.ExposureOption = None,
     format_: options.FormatOption = None,

@@ -15,36 +15,32 @@ _HEADINGS = {
     "name": "material", "shininess": "Ns", "roughness": "Pr", "rmse": "RMSE", "notes": "notes",
 }  # fmt: skip
 
+_LIBRARIES = argument("IN.mtl...", "Material libraries, or patterns such as '*.mtl'.")
+_TO = option(
+    "WHAT",
+    "roughness (Pr from Ns) or shininess (Ns from Pr, the inverse).",
+    words=completion.mtl_targets,
+)
+_TEXTURES = flag(
+    "--textures", "Convert the textures of map_Ns, too, into map_Pr beside the result."
+)
+_EXPONENT_MAX = option("N", "Exponent of a white texel in those textures.")
+_COMPARE = flag("--compare", "Add what importers' rules make of Ns, and their error.")
+
 
 def command(
     context: typer.Context,
-    libraries: Annotated[
-        list[str], argument("IN.mtl...", "Material libraries, or patterns such as '*.mtl'.")
-    ],
+    libraries: Annotated[list[str], _LIBRARIES],
     output: material_files.ResultOption = None,
-    to: Annotated[
-        str,
-        option(
-            "WHAT",
-            "roughness (Pr from Ns) or shininess (Ns from Pr, the inverse).",
-            words=completion.mtl_targets,
-        ),
-    ] = "roughness",
+    to: Annotated[str, _TO] = "roughness",
     metric: options.MetricOption = "environment",
     exposure: options.ExposureOption = None,
     replace: Annotated[bool, flag("--replace", "Drop the statement that was converted.")] = False,
     in_place: material_files.InPlaceOption = False,
     force: options.ForceOption = False,
-    textures: Annotated[
-        bool,
-        flag("--textures", "Convert the textures of map_Ns, too, into map_Pr beside the result."),
-    ] = False,
-    exponent_max: Annotated[
-        float, option("N", "Exponent of a white texel in those textures.")
-    ] = 1000.0,
-    compare: Annotated[
-        bool, flag("--compare", "Add what importers' rules make of Ns, and their error.")
-    ] = False,
+    textures: Annotated[bool, _TEXTURES] = False,
+    exponent_max: Annotated[float, _EXPONENT_MAX] = 1000.0,
+    compare: Annotated[bool, _COMPARE] = False,
     format_: material_files.ReportFormatOption = "table",
 ) -> None:
     """Convert the shininess of Wavefront material libraries to roughness, or back.

@@ -20,14 +20,15 @@ _HEADINGS = {
     "operations": "ops", "ns": "ns", "max_error": "max error", "rmse": "RMSE", "within": "within",
 }  # fmt: skip
 
+_TOLERANCE = option(
+    "T", "Largest maximum error allowed under the metric, relative to the source's."
+)
+
 
 def command(
     value: Annotated[float, argument("VALUE", "Parameter of the surface.")],
     source: options.FromOption,
-    tolerance: Annotated[
-        float,
-        option("T", "Largest maximum error allowed under the metric, relative to the source's."),
-    ] = 0.05,
+    tolerance: Annotated[float, _TOLERANCE] = 0.05,
     metric: options.MetricOption = "environment",
     exposure: options.ExposureOption = None,
     gamma: options.FixedGammaOption = None,

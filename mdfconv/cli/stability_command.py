@@ -13,18 +13,16 @@ from mdfconv.cli.outputs import Outputs
 # Of a table in a narrow terminal.
 _SECONDARY = ("textbook", "worst", "error_in_eps", "cases", "out_of_range")
 
+_MDF = option("MDF", "Only this distribution; repeatable.", words=completion.distributions)
+_PART = typer.Option(help="Only this part.")
+
 
 def command(
     format_: FormatOption = None,
     output: OutputOption = None,
     force: ForceOption = False,
-    mdf: Annotated[
-        list[str] | None,
-        option("MDF", "Only this distribution; repeatable.", words=completion.distributions),
-    ] = None,
-    part: Annotated[
-        Literal["kernels", "conversions"] | None, typer.Option(help="Only this part.")
-    ] = None,
+    mdf: Annotated[list[str] | None, _MDF] = None,
+    part: Annotated[Literal["kernels", "conversions"] | None, _PART] = None,
 ) -> None:
     """Audit the hard cases: errors against 50-digit values, beside those of the printed formulas.
 

@@ -23,10 +23,6 @@ _TYPES = (None, "u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f
 _MOST_DIMENSIONS = 8
 
 
-def _recognizes(name: str, head: bytes) -> bool:
-    return head.startswith(_SIGNATURE)
-
-
 def _read(source: Source, options: ReadOptions) -> Samples:
     options.refuse(source.path, "a tensor file has no columns")
     wanted = _fields(source)
@@ -98,4 +94,4 @@ def _unpack(source: Source, form: str, position: int) -> tuple[tuple[int, ...], 
     return struct.unpack(form, part), position + size
 
 
-READER = Reader("RGL", _recognizes, _read)
+READER = Reader("RGL", lambda name, head: head.startswith(_SIGNATURE), _read)

@@ -31,7 +31,7 @@ def _read(source: Source, options: ReadOptions) -> Samples:
         reason = "no table 'ndf', the distribution of normals, with two axes"
         raise source.error(reason, f"there are {', '.join(wanted) or 'none'}")
     theta = (np.arange(density.shape[1]) / (density.shape[1] - 1)) ** 2 * (np.pi / 2)
-    values = _around(density.astype(float))
+    values = _around(density)
     notes = ["the measured distribution of normals is read, not the reflectance"]
     azimuths = wanted.get("phi_i")
     if azimuths is not None and azimuths.size > 2:
@@ -41,11 +41,13 @@ def _read(source: Source, options: ReadOptions) -> Samples:
 
 def _around(density: Array) -> Array:
     """Return the mean over azimuth, whose first and last row are one direction."""
-    if len(density) == 1:
-        return density[0]
-    weight = np.ones(len(density))
-    weight[[0, -1]] = 0.5
+    # A damaged number can be a NaN that warns when it is cast.
     with np.errstate(all="ignore"):
+        density = density.astype(float)
+        if len(density) == 1:
+            return density[0]
+        weight = np.ones(len(density))
+        weight[[0, -1]] = 0.5
         return weight @ density / weight.sum()
 
 

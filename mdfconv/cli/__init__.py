@@ -25,11 +25,9 @@ from mdfconv.registry import unknown_name
 # As the help shows them: what is asked every day first.
 _PANELS = {
     "Commands": ("convert", "mtl", "gltf", "mitsuba", "texture", "formula", "fit", "list"),
-    "Studies": (
-        "fit-table", "plot-error", "compare", "light", "furnace", "fresnel", "report",
-    ),
+    "Studies": ("fit-table", "plot-error", "compare", "light", "furnace", "fresnel", "report"),
     "Audits": ("bench", "stability", "recommend"),
-}  # fmt: skip
+}
 _COMMANDS = {name: panel for panel, names in _PANELS.items() for name in names}
 
 # A value may be negative, which looks like an option: `_Command` sorts out the real typos.
@@ -106,16 +104,13 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+_VERSION = typer.Option(
+    "--version", callback=_show_version, is_eager=True, help="Print the version and exit."
+)
+
+
 @app.callback(invoke_without_command=True)
-def _root(
-    context: typer.Context,
-    version: Annotated[
-        bool,
-        typer.Option(
-            "--version", callback=_show_version, is_eager=True, help="Print the version and exit."
-        ),
-    ] = False,
-) -> None:
+def _root(context: typer.Context, version: Annotated[bool, _VERSION] = False) -> None:
     """Convert roughness between microfacet distributions.
 
     mdfconv convert --from beckmann --to ggx 0.2

@@ -20,32 +20,25 @@ if TYPE_CHECKING:
 # The paper's reference, and its common rough and smooth surface.
 _REFERENCE, _PARAMETERS = "beckmann", (0.2, 0.05)
 
+_REFERENCE_OPTION = option(
+    "MDF", "Distribution that the others take the place of.", words=completion.endpoints
+)
+_PARAMETER = option(
+    "P", "Its parameter; repeatable; by default lobes as wide as beckmann's at 0.2 and 0.05."
+)
+_SOURCE = option(
+    "MDF", "Source of the timed conversions.", "--from", words=completion.distributions
+)
+_TARGET = option("MDF", "Target of the timed conversions.", "--to", words=completion.distributions)
+_QUICK = flag("--quick", "Less than a minute in place of some: fewer values, rounds.")
+
 
 def command(
-    reference: Annotated[
-        str,
-        option(
-            "MDF", "Distribution that the others take the place of.", words=completion.endpoints
-        ),
-    ] = _REFERENCE,
-    parameter: Annotated[
-        list[float] | None,
-        option(
-            "P",
-            "Its parameter; repeatable; by default lobes as wide as beckmann's at 0.2 and 0.05.",
-        ),
-    ] = None,
-    source: Annotated[
-        str,
-        option("MDF", "Source of the timed conversions.", "--from", words=completion.distributions),
-    ] = _REFERENCE,
-    target: Annotated[
-        str,
-        option("MDF", "Target of the timed conversions.", "--to", words=completion.distributions),
-    ] = "ggx",
-    quick: Annotated[
-        bool, flag("--quick", "Less than a minute in place of some: fewer values, rounds.")
-    ] = False,
+    reference: Annotated[str, _REFERENCE_OPTION] = _REFERENCE,
+    parameter: Annotated[list[float] | None, _PARAMETER] = None,
+    source: Annotated[str, _SOURCE] = _REFERENCE,
+    target: Annotated[str, _TARGET] = "ggx",
+    quick: Annotated[bool, _QUICK] = False,
     format_: options.FormatOption = None,
     csv: Annotated[Path | None, option("FILE", "Write the tables as one CSV.")] = None,
     json: Annotated[Path | None, option("FILE", "Write tables and machine as JSON.")] = None,

@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from mdfconv.cli import completion, options
+from mdfconv.cli import completion, options, process, tables
 from mdfconv.cli.options import argument, option
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
-from mdfconv.cli.process import tell
-from mdfconv.cli.tables import form_of, write_table
 from mdfconv.distributions import one_parameter_distributions
 from mdfconv.distributions.endpoint import Endpoint, one_parameter_endpoint
 from mdfconv.errors import MdfconvError
@@ -43,58 +41,48 @@ _Brdf = Literal[
     "ashikhmin-shirley", "cook-torrance", "smoothie", "smoothie-approx", "modified-phong"
 ]
 
+_VALUES = argument(
+    "[VALUE]...", "Parameters of the source; of beckmann 0.4 and 0.04464 if not given."
+)
+_TARGETS = option(
+    "MDF",
+    "What takes its place, as for --from; repeatable; the paper's if not given.",
+    "--to",
+    words=completion.targets,
+)
+_METRIC = option("METRIC", "What --method fit keeps.", words=completion.metrics)
+_EXPOSURE = option(
+    "E", "Exposure: 1 displays the source's peak, or its brightest channel, as white."
+)
+_LIGHT = typer.Option(help="A directional light or a square one.")
+_BRDF = typer.Option(help="The BRDF into which the distribution is put.")
+_MATERIAL = option(
+    "NAME",
+    "What is reflected: gold, silver, copper, nickel, iron or chrome, in colour; "
+    "acrylic, polycarbonate, polystyrene, polyethylene, polypropylene or pvc.",
+    words=completion.materials,
+)
+_HTML = option(
+    "FILE",
+    "Write a page with sliders instead, from the first VALUE and for the first --to. "
+    "Pictures, too, only with --output.",
+)
+
 
 def command(
     context: typer.Context,
-    values: Annotated[
-        list[float] | None,
-        argument(
-            "[VALUE]...", "Parameters of the source; of beckmann 0.4 and 0.04464 if not given."
-        ),
-    ] = None,
+    values: Annotated[list[float] | None, _VALUES] = None,
     source: options.FromOption = _REFERENCE,
-    targets: Annotated[
-        list[str] | None,
-        option(
-            "MDF",
-            "What takes its place, as for --from; repeatable; the paper's if not given.",
-            "--to",
-            words=completion.targets,
-        ),
-    ] = None,
+    targets: Annotated[list[str] | None, _TARGETS] = None,
     method: options.MethodOption = None,
-    metric: Annotated[
-        str | None, option("METRIC", "What --method fit keeps.", words=completion.metrics)
-    ] = None,
-    exposure: Annotated[
-        float,
-        option("E", "Exposure: 1 displays the source's peak, or its brightest channel, as white."),
-    ] = 1.0,
-    light: Annotated[
-        Literal["directional", "area"], typer.Option(help="A directional light or a square one.")
-    ] = "directional",
-    brdf: Annotated[
-        _Brdf, typer.Option(help="The BRDF into which the distribution is put.")
-    ] = "ashikhmin-shirley",
-    material: Annotated[
-        str | None,
-        option(
-            "NAME",
-            "What is reflected: gold, silver, copper, nickel, iron or chrome, in colour; "
-            "acrylic, polycarbonate, polystyrene, polyethylene, polypropylene or pvc.",
-            words=completion.materials,
-        ),
-    ] = None,
+    metric: Annotated[str | None, _METRIC] = None,
+    exposure: Annotated[float, _EXPOSURE] = 1.0,
+    light: Annotated[Literal["directional", "area"], _LIGHT] = "directional",
+    brdf: Annotated[_Brdf, _BRDF] = "ashikhmin-shirley",
+    material: Annotated[str | None, _MATERIAL] = None,
     normalized: Annotated[bool, typer.Option("--normalized/--unit", help="The form of D.")] = True,
     size: Annotated[int, option("N", "Pixels a side of a picture.")] = 256,
-    html: Annotated[
-        Path | None,
-        option(
-            "FILE",
-            "Write a page with sliders instead, from the first VALUE and for the first --to. "
-            "Pictures, too, only with --output.",
-        ),
-    ] = None,
+    html: Annotated[Path | None, _HTML] = None,
     dpi: options.DpiOption = 120,
     output: options.FolderOption = None,
     force: options.ForceOption = False,
@@ -167,7 +155,7 @@ def command(
         contents[folder / f"{name}.csv"] = file_bytes(csv_text(columns, section))
         contents[folder / f"{name}.png"] = draw_comparison(comparison, dpi)
     outputs.write(contents)
-    form = form_of(format_)
+    form = tables.form_of(format_)
     if form == "table":
         # People read parameters with their symbols.
         texts = {target.label: target.text for target in ends}
@@ -175,7 +163,7 @@ def command(
             row["parameter"] = texts[row["distribution"]](row["parameter"])
     compared = " and ".join(map(end.text, surfaces.values()))
     title = f"Pictures against those of {end.label}, {compared}"
-    write_table(_COLUMNS, rows, form, title=title)
+    tables.write_table(_COLUMNS, rows, form, title=title)
 
 
 def _words(scene: Scene, rules: Sequence[PictureRule], targets: Sequence[str]) -> list[str]:
@@ -233,7 +221,7 @@ def _answering(
     if len(refusals) == len(ends):
         raise next(iter(refusals.values()))
     for refusal in refusals.values():
-        tell(f"left out: {refusal}")
+        process.tell(f"left out: {refusal}")
     return [end for end in ends if end.label not in refusals]
 
 
@@ -244,10 +232,8 @@ def _surfaces(source: Endpoint, values: list[float] | None) -> Mapping[str, floa
     if values:
         return {f"compare-{source.label}-{value_name(value)}": value for value in values}
     if source.label != _REFERENCE:
-        raise MdfconvError(
-            f"the {source.stored.name} {source.stored.symbol} of {source.label} is missing",
-            "give it as VALUE",
-        )
+        missing = f"the {source.stored.name} {source.stored.symbol} of {source.label}"
+        raise MdfconvError(f"{missing} is missing", "give it as VALUE")
     return PAPER_FIGURES
 
 

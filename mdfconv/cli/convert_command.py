@@ -12,9 +12,8 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from mdfconv.cli import options, tables
+from mdfconv.cli import options, process, tables
 from mdfconv.cli.options import argument
-from mdfconv.cli.process import tell
 from mdfconv.conversion import Conversion, explain, list_methods
 from mdfconv.conversion.explanation import explained
 from mdfconv.conversion.values import FREE, ConversionRule, Gamma, Value, holds_pairs
@@ -33,16 +32,15 @@ _BLOCK = 1 << 21
 # As a pair this is no surface: one of its axes would be a mirror.
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?0,\d+\s*\Z")
 
+_VALUES = argument(
+    "VALUE...",
+    "Parameters of the source; a pair X,Y for an anisotropic surface; - reads "
+    "values from standard input, one a line.",
+)
+
 
 def command(
-    values: Annotated[
-        list[str],
-        argument(
-            "VALUE...",
-            "Parameters of the source; a pair X,Y for an anisotropic surface; - reads "
-            "values from standard input, one a line.",
-        ),
-    ],
+    values: Annotated[list[str], _VALUES],
     source: options.FromOption,
     target: options.ToOption,
     method: options.MethodOption = None,
@@ -99,7 +97,7 @@ def command(
     if refusals and (not every or not groups):
         raise refusals[0]
     for refusal in refusals:
-        tell(f"left out: {refusal}")
+        process.tell(f"left out: {refusal}")
     conversions = [conversion for group in groups for conversion in group]
     if form == "plain":
         _write_plain(conversions, named=every, free=free)
@@ -243,7 +241,7 @@ def _tell_new(cautions: Iterable[str], told: set[str]) -> None:
     """Tell each caution that has not been told yet."""
     for caution in cautions:
         if caution not in told:
-            tell(f"note: {caution}")
+            process.tell(f"note: {caution}")
             told.add(caution)
 
 

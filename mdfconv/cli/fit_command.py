@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from mdfconv.cli import completion, options, tables
-from mdfconv.cli.options import Format
+from mdfconv.cli import completion, options, process, tables
+from mdfconv.cli.options import Format, argument, flag, option
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
 from mdfconv.output.records import cell_text
 from mdfconv.registry import ALL
@@ -31,117 +30,78 @@ _CHIEF = ("file", "channel", "distribution", "parameter", "gamma", "rmse", "simp
 _SECOND = ("stderr", "error", "reflectance", "diffuse", "specular", "masking")
 
 
-def _column_option(what: str, otherwise: str = "") -> Any:
-    help_ = f"Column of {what}, by name or number from 1{otherwise}."
-    return typer.Option(metavar="COLUMN", help=help_)
+def _column(what: str, otherwise: str = "") -> Any:
+    return option("COLUMN", f"Column of {what}, by name or number from 1{otherwise}.")
+
+
+_DATA = argument("DATA...", "Files of samples, or patterns such as '*.csv'; - is standard input.")
+_TARGETS = option(
+    "MDF",
+    "Distribution to fit, or the form in which its parameter is printed, such as "
+    "ggx:roughness; repeatable; default all.",
+    "--to",
+    words=completion.targets,
+)
+_QUANTITY = typer.Option(
+    help="ndf (default for text), or brdf at θ_d ≈ 0 (default for MERL, ALTA)."
+)
+_ANGLE_IS = typer.Option(
+    help="Of one angle: that of the half vector (default), or the zenith of the reflected "
+    "or incident direction, the other along the normal."
+)
+_ANGLE_UNIT = option(
+    "UNIT", "degrees, radians or cosine; by default from the header.", words=completion.angle_units
+)
+_CELLS = option("N", "Of a MERL file: N cells of the whole, not the slice θ_d ≈ 0.", min=1)
+_MAX_ANGLE = option("DEG", "Leave out larger angles; 80 by default for brdf at θ_d ≈ 0.")
+_SEPARATE = flag("--separate", "Fit every channel on its own, not with one parameter.")
+_LOSS = typer.Option(
+    help="Squared residuals, those of logarithms, or of two directions those of f_r "
+    "cos θ_i cos θ_o."
+)
+_MASKING = typer.Option(
+    help="Of two directions: smith, where a distribution has its Λ, else v-cavity; or one for all."
+)
+_FRESNEL = option(
+    "F",
+    "Of two directions: none (default), schlick (F₀ 0.04), ior:N, or fit (F₀ free).",
+    words=completion.fresnel_factors,
+)
+_ROBUST = flag("--robust", "Of two directions: let outliers count less.")
+_GAMMA = option(
+    "G",
+    "Second parameter, of gtr and student-t, as a number that is kept; free, or not "
+    "given, it is fitted.",
+)
+_TOLERANCE = option("T", "How much worse than the best the simplest may be.")
+_REPORT = option("FILE", "Write a page for a colleague: .html, or .md with its pictures.")
 
 
 def command(
-    data: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="DATA...",
-            help="Files of samples, or patterns such as '*.csv'; - is standard input.",
-        ),
-    ],
-    targets: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--to",
-            metavar="MDF",
-            autocompletion=completion.targets,
-            help="Distribution to fit, or the form in which its parameter is printed, such as "
-            "ggx:roughness; repeatable; default all.",
-        ),
-    ] = None,
-    quantity: Annotated[
-        Literal["ndf", "brdf"] | None,
-        typer.Option(help="ndf (default for text), or brdf at θ_d ≈ 0 (default for MERL, ALTA)."),
-    ] = None,
-    angle: Annotated[str | None, _column_option("angles", "; by default from the names")] = None,
-    angle_is: Annotated[
-        Literal["half", "reflected", "incident"] | None,
-        typer.Option(
-            help="Of one angle: that of the half vector (default), or the zenith of the reflected "
-            "or incident direction, the other along the normal."
-        ),
-    ] = None,
-    theta_i: Annotated[str | None, _column_option("the incident zenith")] = None,
-    phi_i: Annotated[str | None, _column_option("the incident azimuth")] = None,
-    theta_o: Annotated[str | None, _column_option("the outgoing zenith")] = None,
-    phi_o: Annotated[str | None, _column_option("the outgoing azimuth")] = None,
-    angle_unit: Annotated[
-        str | None,
-        typer.Option(
-            metavar="UNIT",
-            autocompletion=completion.angle_units,
-            help="degrees, radians or cosine; by default from the header.",
-        ),
-    ] = None,
-    values: Annotated[
-        list[str] | None, typer.Option(metavar="COLUMN", help="Column of values; repeatable.")
-    ] = None,
-    cells: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", min=1, help="Of a MERL file: N cells of the whole, not the slice θ_d ≈ 0."
-        ),
-    ] = None,
-    max_angle: Annotated[
-        float | None,
-        typer.Option(
-            metavar="DEG", help="Leave out larger angles; 80 by default for brdf at θ_d ≈ 0."
-        ),
-    ] = None,
-    separate: Annotated[
-        bool,
-        typer.Option("--separate", help="Fit every channel on its own, not with one parameter."),
-    ] = False,
-    loss: Annotated[
-        Literal["linear", "log", "cosine"],
-        typer.Option(
-            help="Squared residuals, those of logarithms, or of two directions those of f_r "
-            "cos θ_i cos θ_o."
-        ),
-    ] = "linear",
-    masking: Annotated[
-        Literal["smith", "v-cavity", "none"] | None,
-        typer.Option(
-            help="Of two directions: smith, where a distribution has its Λ, else v-cavity; or one "
-            "for all."
-        ),
-    ] = None,
-    fresnel: Annotated[
-        str | None,
-        typer.Option(
-            metavar="F",
-            autocompletion=completion.fresnel_factors,
-            help="Of two directions: none (default), schlick (F₀ 0.04), ior:N, or fit (F₀ free).",
-        ),
-    ] = None,
-    robust: Annotated[
-        bool, typer.Option("--robust", help="Of two directions: let outliers count less.")
-    ] = False,
-    gamma: Annotated[
-        str | None,
-        typer.Option(
-            metavar="G",
-            help="Second parameter, of gtr and student-t, as a number that is kept; free, or not "
-            "given, it is fitted.",
-        ),
-    ] = None,
-    tolerance: Annotated[
-        float, typer.Option(metavar="T", help="How much worse than the best the simplest may be.")
-    ] = 0.05,
+    data: Annotated[list[str], _DATA],
+    targets: Annotated[list[str] | None, _TARGETS] = None,
+    quantity: Annotated[Literal["ndf", "brdf"] | None, _QUANTITY] = None,
+    angle: Annotated[str | None, _column("angles", "; by default from the names")] = None,
+    angle_is: Annotated[Literal["half", "reflected", "incident"] | None, _ANGLE_IS] = None,
+    theta_i: Annotated[str | None, _column("the incident zenith")] = None,
+    phi_i: Annotated[str | None, _column("the incident azimuth")] = None,
+    theta_o: Annotated[str | None, _column("the outgoing zenith")] = None,
+    phi_o: Annotated[str | None, _column("the outgoing azimuth")] = None,
+    angle_unit: Annotated[str | None, _ANGLE_UNIT] = None,
+    values: Annotated[list[str] | None, option("COLUMN", "Column of values; repeatable.")] = None,
+    cells: Annotated[int | None, _CELLS] = None,
+    max_angle: Annotated[float | None, _MAX_ANGLE] = None,
+    separate: Annotated[bool, _SEPARATE] = False,
+    loss: Annotated[Literal["linear", "log", "cosine"], _LOSS] = "linear",
+    masking: Annotated[Literal["smith", "v-cavity", "none"] | None, _MASKING] = None,
+    fresnel: Annotated[str | None, _FRESNEL] = None,
+    robust: Annotated[bool, _ROBUST] = False,
+    gamma: Annotated[str | None, _GAMMA] = None,
+    tolerance: Annotated[float, _TOLERANCE] = 0.05,
     format_: options.FormatOption = None,
     output: options.OutputOption = None,
     png: options.PngOption = None,
-    report: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Write a page for a colleague: .html, or .md with its pictures."
-        ),
-    ] = None,
+    report: Annotated[Path | None, _REPORT] = None,
     force: options.ForceOption = False,
 ) -> None:
     """Fit distributions to measured reflectance or to a measured distribution of normals.
@@ -227,10 +187,8 @@ def _analysis(
 
     samples = read(path, columns)
     if needs_two and isinstance(samples, Samples):
-        raise MdfconvError(
-            f"{path}: --masking, --fresnel, --robust and --loss cosine need two directions",
-            "this file has one angle",
-        )
+        reason = "--masking, --fresnel, --robust and --loss cosine need two directions"
+        raise MdfconvError(f"{path}: {reason}", "this file has one angle")
     return fit(samples, name=path.name, **settings)
 
 
@@ -280,12 +238,12 @@ def _tell(analysis: Analysis, tolerance: float, *, named: bool) -> None:
     """Write notes and verdicts to standard error."""
     file = f"{analysis.name}: " if named else ""
     for note in analysis.notes:
-        tell(f"{file}note: {note}")
+        process.tell(f"{file}note: {note}")
     for result in analysis.results:
         channels = result.samples.channels
         channel = f"channel {channels[0]}: " if len(analysis.results) > 1 else ""
         cheap = result.simplest.distribution
-        tell(
+        process.tell(
             f"{file}{channel}best is {result.fits[0].distribution.name}; simplest within "
             f"{100 * tolerance:g} % of its error is {cheap.name}, at {cheap.operations} "
             "operations an evaluation"
@@ -310,5 +268,5 @@ def _targets(ends: Sequence[Endpoint], gamma: float | None) -> list[Distribution
     targets = fitted_distributions(named, gamma)
     for mdf in () if named else fitted_distributions(None, None):
         if mdf not in targets:
-            tell(f"note: {mdf.name} is left out: it has no γ = {gamma:g}")
+            process.tell(f"note: {mdf.name} is left out: it has no γ = {gamma:g}")
     return targets

@@ -6,10 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from mdfconv.cli import options
+from mdfconv.cli import options, tables
 from mdfconv.cli.options import flag, option
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.tables import progress, write_table
 from mdfconv.distributions import distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import percent_hint
@@ -17,31 +16,27 @@ from mdfconv.errors import MdfconvError
 
 _LARGEST_SWEEP = 10_000
 
+_COMPARE = flag("--compare", "Put each printed cell of the paper beside ours.")
+_SWEEP = option(
+    "LO:HI:COUNT",
+    "Fit other m_B, spaced logarithmically; unit forms on β up to 4 m_B, where the "
+    "paper's rows have limits of their own.",
+)
+_EXTENDED = flag("--extended", "Add what the paper's table lacks, with γ.")
+_CLOSED_FORMS = flag("--closed-forms", "Refit the coefficients of the paper's formulas.")
+
 
 def command(
     context: typer.Context,
     format_: options.FormatOption = None,
     output: options.OutputOption = None,
-    compare: Annotated[
-        bool, flag("--compare", "Put each printed cell of the paper beside ours.")
-    ] = False,
-    sweep: Annotated[
-        str | None,
-        option(
-            "LO:HI:COUNT",
-            "Fit other m_B, spaced logarithmically; unit forms on β up to 4 m_B, where the "
-            "paper's rows have limits of their own.",
-        ),
-    ] = None,
+    compare: Annotated[bool, _COMPARE] = False,
+    sweep: Annotated[str | None, _SWEEP] = None,
     m_b: Annotated[list[float] | None, option("M", "Fit this m_B; repeatable.")] = None,
     metric: options.MetricOption = "unit",
     exposure: options.ExposureOption = None,
-    extended: Annotated[
-        bool, flag("--extended", "Add what the paper's table lacks, with γ.")
-    ] = False,
-    closed_forms: Annotated[
-        bool, flag("--closed-forms", "Refit the coefficients of the paper's formulas.")
-    ] = False,
+    extended: Annotated[bool, _EXTENDED] = False,
+    closed_forms: Annotated[bool, _CLOSED_FORMS] = False,
     force: options.ForceOption = False,
 ) -> None:
     """Reproduce Table 2 of Sawicki 2021: Beckmann fitted by the others over a sweep of m_B.
@@ -92,11 +87,11 @@ def command(
         from mdfconv.studies.table2 import fit_table
 
         values, limit = _sweep(sweep, m_b)
-        with progress("Fitting", values.size) as advance:
+        with tables.progress("Fitting", values.size) as advance:
             rows = fit_table(values, limit, chosen, extended=extended, progress=advance)
         title = f"Fits of Beckmann, metric {chosen}"
         minor = [name for name in rows[0] if name.startswith("rmse")]
-    write_table(list(rows[0]), rows, format_, outputs, title=title, secondary=minor)
+    tables.write_table(list(rows[0]), rows, format_, outputs, title=title, secondary=minor)
 
 
 def _sweep(sweep: str | None, m_b: list[float] | None) -> tuple[Array, Array]:

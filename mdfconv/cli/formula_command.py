@@ -6,41 +6,36 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion, options
+from mdfconv.cli import completion, options, tables
 from mdfconv.cli.options import flag, option
-from mdfconv.cli.tables import write_table
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 
 _COLUMNS = ("operations", "worst_error", "formula")
+
+_TOLERANCE = option("T", "Worst relative error against the fit that is accepted.")
+_RANGE = option(
+    "LO:HI",
+    "Values of the source; by default alpha 0.01:0.8, roughness and glossiness "
+    "0.1:0.9, exponents 1:10000.",
+    "--range",
+)
+_LANGUAGE = option("LANG", "glsl, hlsl, c, python or latex.", "--lang", words=completion.languages)
+_EVERY = flag("--all", "Print the table of cost against error instead, in that language.")
 
 
 def command(
     context: typer.Context,
     source: options.FromOption,
     target: options.ToOption,
-    tolerance: Annotated[
-        float, option("T", "Worst relative error against the fit that is accepted.")
-    ] = 0.01,
-    range_: Annotated[
-        str | None,
-        option(
-            "LO:HI",
-            "Values of the source; by default alpha 0.01:0.8, roughness and glossiness "
-            "0.1:0.9, exponents 1:10000.",
-            "--range",
-        ),
-    ] = None,
+    tolerance: Annotated[float, _TOLERANCE] = 0.01,
+    range_: Annotated[str | None, _RANGE] = None,
     metric: options.MetricOption = "environment",
     exposure: options.ExposureOption = None,
     gamma: options.FixedGammaOption = None,
     specular: options.SpecularOption = None,
-    language: Annotated[
-        str, option("LANG", "glsl, hlsl, c, python or latex.", "--lang", words=completion.languages)
-    ] = "glsl",
-    every: Annotated[
-        bool, flag("--all", "Print the table of cost against error instead, in that language.")
-    ] = False,
+    language: Annotated[str, _LANGUAGE] = "glsl",
+    every: Annotated[bool, _EVERY] = False,
     format_: options.FormatOption = None,
 ) -> None:
     """Print the cheapest formula for a conversion, to paste into a shader or an importer.
@@ -85,7 +80,7 @@ def command(
             }
             for formula in pareto_front(problem)
         ]
-        write_table(_COLUMNS, rows, format_, title=title)
+        tables.write_table(_COLUMNS, rows, format_, title=title)
     else:
         typer.echo(write_formula(cheapest(problem, tolerance), problem, language))
 

@@ -8,11 +8,11 @@ from mdfconv.cli.options import ForceOption, FormatOption, OutputOption, PngOpti
 from mdfconv.cli.outputs import Outputs
 from mdfconv.cli.tables import write_table
 
+_IOR = option("N", "Relative index of refraction, 0.25 to 4, not near 1.")
+
 
 def command(
-    ior: Annotated[
-        float, option("N", "Relative index of refraction, 0.25 to 4, not near 1.")
-    ] = 1.4,
+    ior: Annotated[float, _IOR] = 1.4,
     mu: Annotated[float, option("M", "Mean of the weight in l.h = 2 (l.H)^2, 0 to 2.")] = 0.55,
     sigma: Annotated[float, option("S", "Standard deviation of the weight.")] = 0.12,
     format_: FormatOption = None,

@@ -6,10 +6,9 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion, options
+from mdfconv.cli import completion, options, tables
 from mdfconv.cli.options import argument, option
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.tables import write_table
 from mdfconv.errors import MdfconvError
 
 _MOST_POINTS = 1001
@@ -17,42 +16,35 @@ _MOST_SAMPLES = 10_000_000
 # Samples at all points together: some seconds.
 _MOST_DIRECTIONS = 100_000_000
 
+_PARAMETER = argument("PARAMETER", "Exponent of the Phong BRDFs, α of the others.")
+_BRDF = option(
+    "BRDF",
+    "phong, modified-phong, ggx, beckmann, smoothie, smoothie-approx or "
+    "ashikhmin-shirley; ggx:roughness takes PARAMETER for a stored form of α.",
+    words=completion.furnace_brdfs,
+)
+_NORMALIZER = option(
+    "NAME",
+    "Of modified-phong: usual (the default), arvo (integer exponents) or mallett-yuksel.",
+    words=completion.normalizers,
+)
+_MASKING = option(
+    "G",
+    "Of ggx and beckmann: correlated (the default), separable, v-cavity, ksk or none.",
+    "--g",
+    words=completion.maskings,
+)
+_SAMPLES = option("N", "Estimate by N random directions a cosine, too.", "--mc")
+
 
 def command(
     context: typer.Context,
-    parameter: Annotated[
-        float, argument("PARAMETER", "Exponent of the Phong BRDFs, α of the others.")
-    ],
-    brdf: Annotated[
-        str,
-        option(
-            "BRDF",
-            "phong, modified-phong, ggx, beckmann, smoothie, smoothie-approx or "
-            "ashikhmin-shirley; ggx:roughness takes PARAMETER for a stored form of α.",
-            words=completion.furnace_brdfs,
-        ),
-    ] = "ggx",
-    normalizer: Annotated[
-        str | None,
-        option(
-            "NAME",
-            "Of modified-phong: usual (the default), arvo (integer exponents) or mallett-yuksel.",
-            words=completion.normalizers,
-        ),
-    ] = None,
-    masking: Annotated[
-        str | None,
-        option(
-            "G",
-            "Of ggx and beckmann: correlated (the default), separable, v-cavity, ksk or none.",
-            "--g",
-            words=completion.maskings,
-        ),
-    ] = None,
+    parameter: Annotated[float, _PARAMETER],
+    brdf: Annotated[str, _BRDF] = "ggx",
+    normalizer: Annotated[str | None, _NORMALIZER] = None,
+    masking: Annotated[str | None, _MASKING] = None,
     points: Annotated[int, option("N", "Cosines of the viewer, from 0 to 1.")] = 21,
-    samples: Annotated[
-        int | None, option("N", "Estimate by N random directions a cosine, too.", "--mc")
-    ] = None,
+    samples: Annotated[int | None, _SAMPLES] = None,
     seed: Annotated[int, option("S", "Of the random numbers.")] = 0,
     png: options.PngOption = None,
     format_: options.FormatOption = None,
@@ -108,7 +100,7 @@ def command(
         curve = {label: [row["albedo"] for row in rows]}
         picture[png] = draw_albedo([row["cos_theta"] for row in rows], {"": curve})
     title = f"White furnace: {label}"
-    write_table(list(rows[0]), rows, format_, outputs, beside=picture, title=title)
+    tables.write_table(list(rows[0]), rows, format_, outputs, beside=picture, title=title)
 
 
 def _decoded(brdf: str, value: float) -> tuple[str, float]:

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion, material_files, options
+from mdfconv.cli import completion, material_files, options, process
 from mdfconv.cli.options import argument, flag, option
-from mdfconv.cli.process import tell
 from mdfconv.errors import MdfconvError
 
 _HEADINGS = {
@@ -17,49 +16,41 @@ _HEADINGS = {
     "notes": "notes",
 }  # fmt: skip
 
+_FILES = argument("IN.glb...", "glTF or GLB files, or patterns such as '*.glb'.")
+_SOURCE = option(
+    "MDF:PROGRAM",
+    "What the program that wrote the file stored, such as blinn-phong:obj2gltf "
+    "(mdfconv list --encodings has all).",
+    "--from",
+    words=completion.endpoints,
+)
+_TARGET = option(
+    "MDF:ENCODING",
+    "What the factors become; if not given ggx:roughness, as glTF defines them.",
+    "--to",
+    words=completion.endpoints,
+)
+_TEXTURES = flag("--textures", "Convert roughness textures, too, each with the factor before it.")
+_LOSSY = flag("--lossy", "Take JPEG textures, although altered; they become PNG.")
+_GUESS = flag("--guess", "Only propose --from by the file's asset.generator; write nothing.")
+_COMPARE = flag("--compare", "Add what importers' rules make of the exponents, and their error.")
+
 
 def command(
     context: typer.Context,
-    files: Annotated[
-        list[str], argument("IN.glb...", "glTF or GLB files, or patterns such as '*.glb'.")
-    ],
+    files: Annotated[list[str], _FILES],
     output: material_files.ResultOption = None,
-    source: Annotated[
-        str | None,
-        option(
-            "MDF:PROGRAM",
-            "What the program that wrote the file stored, such as blinn-phong:obj2gltf "
-            "(mdfconv list --encodings has all).",
-            "--from",
-            words=completion.endpoints,
-        ),
-    ] = None,
-    target: Annotated[
-        str | None,
-        option(
-            "MDF:ENCODING",
-            "What the factors become; if not given ggx:roughness, as glTF defines them.",
-            "--to",
-            words=completion.endpoints,
-        ),
-    ] = None,
+    source: Annotated[str | None, _SOURCE] = None,
+    target: Annotated[str | None, _TARGET] = None,
     metric: options.MetricOption = "environment",
     exposure: options.ExposureOption = None,
     specular: options.SpecularOption = None,
     in_place: material_files.InPlaceOption = False,
     force: options.ForceOption = False,
-    textures: Annotated[
-        bool, flag("--textures", "Convert roughness textures, too, each with the factor before it.")
-    ] = False,
-    lossy: Annotated[
-        bool, flag("--lossy", "Take JPEG textures, although altered; they become PNG.")
-    ] = False,
-    guess: Annotated[
-        bool, flag("--guess", "Only propose --from by the file's asset.generator; write nothing.")
-    ] = False,
-    compare: Annotated[
-        bool, flag("--compare", "Add what importers' rules make of the exponents, and their error.")
-    ] = False,
+    textures: Annotated[bool, _TEXTURES] = False,
+    lossy: Annotated[bool, _LOSSY] = False,
+    guess: Annotated[bool, _GUESS] = False,
+    compare: Annotated[bool, _COMPARE] = False,
     format_: material_files.ReportFormatOption = "table",
 ) -> None:
     """Repair the roughness factors of glTF 2.0 files whose writer had exponents.
@@ -96,10 +87,8 @@ def command(
     if not textures:
         options.refuse_given(context, ["lossy"], "goes with --textures")
     if source is None:
-        raise MdfconvError(
-            "the rule by which the factors were stored is missing: give --from",
-            "--guess proposes one",
-        )
+        reason = "the rule by which the factors were stored is missing: give --from"
+        raise MdfconvError(reason, "--guess proposes one")
     chosen = options.chosen_metric(metric, exposure)
     names = with_specular(source, target or ROUGHNESS, specular)
     # A mistake in the names is none of a file.
@@ -117,7 +106,7 @@ def command(
             )
         proposals = _proposals(conversion.generator)
         if proposals and dialect not in proposals:
-            tell(
+            process.tell(
                 f"note: {destination.source} was written by '{conversion.generator}', which stands "
                 f"for {' or '.join(proposals.values())}"
             )
@@ -149,10 +138,8 @@ def _check_form(source: Path, output: Path, data: bytes) -> None:
     form = ".glb" if is_glb(data) else ".gltf"
     named = output.suffix.lower()
     if output.name != source.name and named in {".glb", ".gltf"} - {form}:
-        raise MdfconvError(
-            f"{source} stays {form[1:]} in its form, {output} says {named[1:]}",
-            f"name it {output.with_suffix(form)}",
-        )
+        reason = f"{source} stays {form[1:]} in its form, {output} says {named[1:]}"
+        raise MdfconvError(reason, f"name it {output.with_suffix(form)}")
 
 
 def _proposals(generator: str) -> dict[str, str]:

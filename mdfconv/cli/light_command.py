@@ -7,23 +7,20 @@ from typing import Annotated
 
 import typer
 
+from mdfconv.cli import process, tables
 from mdfconv.cli.options import ForceOption, FormatOption, PngOption, argument, option
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.process import tell
-from mdfconv.cli.tables import console, form_of, write_table
 from mdfconv.output.records import csv_text, json_text
 
 _ROUGHNESSES = (0.05, 0.1, 0.2, 0.4)
 
+_MAP = argument("MAP", "Environment map, linear, 2:1: OpenEXR, Radiance .hdr or another picture.")
+_M_B = option("M", "Beckmann's m_B; repeatable; by default 0.05 to 0.4.")
+
 
 def command(
-    map_: Annotated[
-        Path,
-        argument("MAP", "Environment map, linear, 2:1: OpenEXR, Radiance .hdr or another picture."),
-    ],
-    m_b: Annotated[
-        list[float] | None, option("M", "Beckmann's m_B; repeatable; by default 0.05 to 0.4.")
-    ] = None,
+    map_: Annotated[Path, _MAP],
+    m_b: Annotated[list[float] | None, _M_B] = None,
     spectrum: Annotated[Path | None, option("FILE", "Write the spectrum as CSV.", "--csv")] = None,
     png: PngOption = None,
     force: ForceOption = False,
@@ -55,12 +52,12 @@ def command(
     if png:
         contents[png] = draw_spectrum(report.spectrum, map_.name)
     outputs.write(contents)
-    form = form_of(format_)
+    form = tables.form_of(format_)
     if form == "json":
         light = {"exponent": report.spectrum.exponent, "softness": report.softness}
         lists = {"conversions": rows, "spectrum": degrees}
         typer.echo(json_text({"map": str(map_), **light, **lists}))
         return
-    write_table(list(rows[0]), rows, form, title="α of the best GGX for Beckmann's m_B")
-    say = console().print if form == "table" else tell
+    tables.write_table(list(rows[0]), rows, form, title="α of the best GGX for Beckmann's m_B")
+    say = tables.console().print if form == "table" else process.tell
     say(report.sentence)

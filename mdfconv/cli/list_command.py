@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-from mdfconv.cli import options
+from mdfconv.cli import options, tables
 from mdfconv.cli.options import flag
-from mdfconv.cli.tables import console, form_of, print_table, write_table
 from mdfconv.distributions import Distribution, list_distributions
 from mdfconv.distributions.endpoint import forms_of
 from mdfconv.errors import MdfconvError
@@ -22,11 +21,11 @@ _FOOTNOTE = (
     "makes of a surface that is none."
 )
 
+_ENCODINGS = flag("--encodings", "List what follows a colon: how files and programs store it.")
+
 
 def command(
-    encodings: Annotated[
-        bool, flag("--encodings", "List what follows a colon: how files and programs store it.")
-    ] = False,
+    encodings: Annotated[bool, _ENCODINGS] = False,
     metric: options.OptionalMetricOption = None,
     exposure: options.ExposureOption = None,
     format_: options.FormatOption = None,
@@ -49,23 +48,23 @@ def command(
         return
     if metric is not None or exposure is not None:
         raise MdfconvError("--metric is of --encodings")
-    form = form_of(format_, in_pipe="plain")
+    form = tables.form_of(format_, in_pipe="plain")
     if form == "table":
         rows = [_row(mdf) for mdf in list_distributions()]
-        print_table(list(rows[0]), rows)
+        tables.print_table(list(rows[0]), rows)
     else:
         records = [_record(mdf) for mdf in list_distributions()]
-        write_table(["name"] if form == "plain" else list(records[0]), records, form)
+        tables.write_table(["name"] if form == "plain" else list(records[0]), records, form)
 
 
 def _list_encodings(metric: Metric, format_: options.Format | None) -> None:
     """Print the table of encodings and dialects."""
     from mdfconv.scene.shininess import EXPONENTS, encoding_records
 
-    form = form_of(format_)
+    form = tables.form_of(format_)
     records = encoding_records(metric)
     if form != "table":
-        write_table(["encoding"] if form == "plain" else list(records[0]), records, form)
+        tables.write_table(["encoding"] if form == "plain" else list(records[0]), records, form)
         return
     rows = [
         {
@@ -77,8 +76,8 @@ def _list_encodings(metric: Metric, format_: options.Format | None) -> None:
         for record in records
     ]
     title = f"Encodings, and the RMSE of their rules under {metric}"
-    print_table(list(rows[0]), rows, title, secondary=_SECONDARY)
-    console().print(_FOOTNOTE)
+    tables.print_table(list(rows[0]), rows, title, secondary=_SECONDARY)
+    tables.console().print(_FOOTNOTE)
 
 
 def _error(rmse: float | None) -> float | str | None:

@@ -8,36 +8,32 @@ from typing import Annotated, Any
 
 import typer
 
-from mdfconv.cli import completion, material_files, options
+from mdfconv.cli import completion, material_files, options, process
 from mdfconv.cli.options import argument, flag, option
-from mdfconv.cli.process import tell
 
 _HEADINGS = {
     "name": "BSDF", "line": "line", "distribution": "from", "value": "α", "result": "new α",
     "rmse": "RMSE", "rmse_unchanged": "kept", "notes": "notes",
 }  # fmt: skip
 
+_TO = option(
+    "MDF", "Distribution to convert to: ggx or beckmann.", words=completion.mitsuba_targets
+)
+_TEXTURES = flag("--textures", "Convert the bitmaps of alpha, too, beside the result.")
+_COMPARE = flag("--compare", "Add what is left if alpha is kept: its error.")
+
 
 def command(
     context: typer.Context,
     scenes: Annotated[list[str], argument("IN.xml...", "Scenes, or patterns such as '*.xml'.")],
     output: material_files.ResultOption = None,
-    to: Annotated[
-        str,
-        option(
-            "MDF", "Distribution to convert to: ggx or beckmann.", words=completion.mitsuba_targets
-        ),
-    ] = "ggx",
+    to: Annotated[str, _TO] = "ggx",
     metric: options.MetricOption = "environment",
     exposure: options.ExposureOption = None,
     in_place: material_files.InPlaceOption = False,
     force: options.ForceOption = False,
-    textures: Annotated[
-        bool, flag("--textures", "Convert the bitmaps of alpha, too, beside the result.")
-    ] = False,
-    compare: Annotated[
-        bool, flag("--compare", "Add what is left if alpha is kept: its error.")
-    ] = False,
+    textures: Annotated[bool, _TEXTURES] = False,
+    compare: Annotated[bool, _COMPARE] = False,
     format_: material_files.ReportFormatOption = "table",
 ) -> None:
     """Convert the distribution of rough BSDFs in Mitsuba scenes (0.6 and 3).
@@ -112,4 +108,4 @@ def _print_more(record: dict[str, Any]) -> None:
         )
     for include in record["includes"]:
         place = f"{record['file']}:{include['line']}"
-        tell(f"{place}: {include['file']} is included, and is not read: convert it, too")
+        process.tell(f"{place}: {include['file']} is included, and is not read: convert it, too")

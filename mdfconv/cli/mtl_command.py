@@ -7,45 +7,40 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion, material_files, options
+from mdfconv.cli import completion, material_files, options, tables
 from mdfconv.cli.options import argument, flag, option
-from mdfconv.cli.tables import progress
 from mdfconv.errors import MdfconvError
 
 _HEADINGS = {
     "name": "material", "shininess": "Ns", "roughness": "Pr", "rmse": "RMSE", "notes": "notes",
 }  # fmt: skip
 
+_LIBRARIES = argument("IN.mtl...", "Material libraries, or patterns such as '*.mtl'.")
+_TO = option(
+    "WHAT",
+    "roughness (Pr from Ns) or shininess (Ns from Pr, the inverse).",
+    words=completion.mtl_targets,
+)
+_TEXTURES = flag(
+    "--textures", "Convert the textures of map_Ns, too, into map_Pr beside the result."
+)
+_EXPONENT_MAX = option("N", "Exponent of a white texel in those textures.")
+_COMPARE = flag("--compare", "Add what importers' rules make of Ns, and their error.")
+
 
 def command(
     context: typer.Context,
-    libraries: Annotated[
-        list[str], argument("IN.mtl...", "Material libraries, or patterns such as '*.mtl'.")
-    ],
+    libraries: Annotated[list[str], _LIBRARIES],
     output: material_files.ResultOption = None,
-    to: Annotated[
-        str,
-        option(
-            "WHAT",
-            "roughness (Pr from Ns) or shininess (Ns from Pr, the inverse).",
-            words=completion.mtl_targets,
-        ),
-    ] = "roughness",
+    to: Annotated[str, _TO] = "roughness",
     metric: options.MetricOption = "environment",
     exposure: options.ExposureOption = None,
     replace: Annotated[bool, flag("--replace", "Drop the statement that was converted.")] = False,
     in_place: material_files.InPlaceOption = False,
     force: options.ForceOption = False,
-    textures: Annotated[
-        bool,
-        flag("--textures", "Convert the textures of map_Ns, too, into map_Pr beside the result."),
-    ] = False,
-    exponent_max: Annotated[
-        float, option("N", "Exponent of a white texel in those textures.")
-    ] = 1000.0,
-    compare: Annotated[
-        bool, flag("--compare", "Add what importers' rules make of Ns, and their error.")
-    ] = False,
+    textures: Annotated[bool, _TEXTURES] = False,
+    exponent_max: Annotated[float, _EXPONENT_MAX] = 1000.0,
+    compare: Annotated[bool, _COMPARE] = False,
     format_: material_files.ReportFormatOption = "table",
 ) -> None:
     """Convert the shininess of Wavefront material libraries to roughness, or back.
@@ -82,16 +77,14 @@ def command(
         names: dict[str, str] | None = None
         problems: list[MaterialProblem] = []
         if textures:
-            names, problems = library.convert_library_textures(data, folder, rule, progress)
+            names, problems = library.convert_library_textures(data, folder, rule, tables.progress)
         with material_files.about(destination.source):
             conversion = library.convert_mtl(
                 data, to, metric=chosen, replace=replace, texture_names=names
             )
+        problems += conversion.problems
         return dataclasses.replace(
-            conversion,
-            files=folder.files,
-            inputs=folder.inputs,
-            problems=(*problems, *conversion.problems),
+            conversion, files=folder.files, inputs=folder.inputs, problems=tuple(problems)
         )
 
     report = material_files.MaterialReport(

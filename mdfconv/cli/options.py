@@ -43,31 +43,26 @@ def argument(metavar: str, help_: str, **more: Any) -> Any:
     return typer.Argument(metavar=metavar, help=help_, **more)
 
 
-FromOption = Annotated[
-    str,
-    option(
-        "MDF",
-        "Distribution that the values belong to, such as beckmann, ggx or blinn-phong; "
-        "ggx:roughness and ggx:glossiness name stored forms of α, blinn-phong:reflected the older "
-        "Phong exponent.",
-        "--from",
-        words=completion.endpoints,
-    ),
-]
+_FROM = option(
+    "MDF",
+    "Distribution that the values belong to, such as beckmann, ggx or blinn-phong; ggx:roughness "
+    "and ggx:glossiness name stored forms of α, blinn-phong:reflected the older Phong exponent.",
+    "--from",
+    words=completion.endpoints,
+)
+FromOption = Annotated[str, _FROM]
 ToOption = Annotated[
     str,
     option("MDF", "Distribution to convert to, as for --from.", "--to", words=completion.targets),
 ]
-MethodOption = Annotated[
-    str | None,
-    option(
-        "METHOD",
-        "closed-form (keeps the lobe's shape, approximately), half-angle, ward, peak, "
-        "fit: exact, under the metric, or fast: the same from stored polynomials. With --metric "
-        "alone the fit, by fast where that reaches.",
-        words=completion.methods,
-    ),
-]
+_METHOD = option(
+    "METHOD",
+    "closed-form (keeps the lobe's shape, approximately), half-angle, ward, peak, "
+    "fit: exact, under the metric, or fast: the same from stored polynomials. With --metric "
+    "alone the fit, by fast where that reaches.",
+    words=completion.methods,
+)
+MethodOption = Annotated[str | None, _METHOD]
 _METRIC = option(
     "METRIC",
     "What a fit keeps, and what errors are taken of: unit (the shape of the lobe), energy "
@@ -77,41 +72,30 @@ _METRIC = option(
 )
 MetricOption = Annotated[str, _METRIC]
 OptionalMetricOption = Annotated[str | None, _METRIC]
-ExposureOption = Annotated[
-    float | None,
-    option(
-        "E", "Exposure of the display metric; 1, if not given, puts the source's peak at white."
-    ),
-]
+_EXPOSURE = option(
+    "E", "Exposure of the display metric; 1, if not given, puts the source's peak at white."
+)
+ExposureOption = Annotated[float | None, _EXPOSURE]
 _GAMMA_HELP = "Second parameter, of gtr and student-t; 2, which is ggx, if not given"
 GammaOption = Annotated[str | None, option("G", f"{_GAMMA_HELP}; free fits it.")]
 FixedGammaOption = Annotated[str | None, option("G", f"{_GAMMA_HELP}.")]
-SpecularOption = Annotated[
-    float | None,
-    option(
-        "L",
-        "Weight of the specular lobe or luminance of Ks, above 0 to 1, where a program's rule "
-        "depends on it (mdfconv list --encodings).",
-    ),
-]
-FormatOption = Annotated[
-    Format | None,
-    typer.Option(
-        "--format",
-        help="Form of the output: by default a table on a terminal, in a pipe what a program reads "
-        "most easily, in a file what its name ends in.",
-    ),
-]
+_SPECULAR = option(
+    "L",
+    "Weight of the specular lobe or luminance of Ks, above 0 to 1, where a program's rule "
+    "depends on it (mdfconv list --encodings).",
+)
+SpecularOption = Annotated[float | None, _SPECULAR]
+_FORMAT = typer.Option(
+    "--format",
+    help="Form of the output: by default a table on a terminal, in a pipe what a program reads "
+    "most easily, in a file what its name ends in.",
+)
+FormatOption = Annotated[Format | None, _FORMAT]
 OutputOption = Annotated[Path | None, option("FILE", "Write to a file instead.", "--output", "-o")]
-FolderOption = Annotated[
-    Path | None,
-    option(
-        "DIR",
-        "Folder to write to, created if it is not there; by default ./reports.",
-        "--output",
-        "-o",
-    ),
-]
+_FOLDER = option(
+    "DIR", "Folder to write to, created if it is not there; by default ./reports.", "--output", "-o"
+)
+FolderOption = Annotated[Path | None, _FOLDER]
 ForceOption = Annotated[
     bool, flag("--force", "Write over files that exist; else they are refused.")
 ]

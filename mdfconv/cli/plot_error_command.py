@@ -7,10 +7,9 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli import completion, options
+from mdfconv.cli import completion, options, tables
 from mdfconv.cli.options import flag, option
 from mdfconv.cli.outputs import Outputs, check_folder, value_name
-from mdfconv.cli.tables import write_table
 from mdfconv.distributions import one_parameter_distribution
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
@@ -19,30 +18,26 @@ from mdfconv.output.files import file_bytes
 _REFERENCE = "beckmann"
 _COLUMNS = ("figure", "distribution", "parameter", "max_error_percent", "beta_rad")
 
+_M_B = option("M", "Beckmann's m_B; repeatable; default the paper's.")
+_REFERENCE_OPTION = option(
+    "MDF", "Distribution that the errors are taken against.", words=completion.distributions
+)
+_MDF = option(
+    "MDF",
+    "Only this distribution, or the form in which its parameter is printed, such as "
+    "ggx:roughness; repeatable.",
+    words=completion.endpoints,
+)
+
 
 def command(
     context: typer.Context,
-    m_b: Annotated[
-        list[float] | None, option("M", "Beckmann's m_B; repeatable; default the paper's.")
-    ] = None,
+    m_b: Annotated[list[float] | None, _M_B] = None,
     method: options.MethodOption = None,
     metric: options.OptionalMetricOption = None,
     exposure: options.ExposureOption = None,
-    reference: Annotated[
-        str,
-        option(
-            "MDF", "Distribution that the errors are taken against.", words=completion.distributions
-        ),
-    ] = _REFERENCE,
-    mdf: Annotated[
-        list[str] | None,
-        option(
-            "MDF",
-            "Only this distribution, or the form in which its parameter is printed, such as "
-            "ggx:roughness; repeatable.",
-            words=completion.endpoints,
-        ),
-    ] = None,
+    reference: Annotated[str, _REFERENCE_OPTION] = _REFERENCE,
+    mdf: Annotated[list[str] | None, _MDF] = None,
     output: options.FolderOption = None,
     force: options.ForceOption = False,
     png: Annotated[bool, typer.Option("--png/--no-png", help="Write pictures.")] = True,
@@ -93,7 +88,7 @@ def command(
             {"figure": name} | row for row in options.in_asked_forms(drawn.maxima(), endpoints)
         ]
     title = f"Largest error against {reference}"
-    write_table(_COLUMNS, rows, format_, outputs, beside=contents, title=title)
+    tables.write_table(_COLUMNS, rows, format_, outputs, beside=contents, title=title)
 
 
 def _parameter_sets(

@@ -6,10 +6,8 @@ from typing import Annotated
 
 import typer
 
-from mdfconv.cli import options
+from mdfconv.cli import options, process, tables
 from mdfconv.cli.options import argument, option
-from mdfconv.cli.process import tell
-from mdfconv.cli.tables import console, form_of, print_table, table_text, value_text
 from mdfconv.output.records import json_text
 
 _FOOTNOTE = (
@@ -22,14 +20,15 @@ _HEADINGS = {
     "operations": "ops", "ns": "ns", "max_error": "max error", "rmse": "RMSE", "within": "within",
 }  # fmt: skip
 
+_TOLERANCE = option(
+    "T", "Largest maximum error allowed under the metric, relative to the source's."
+)
+
 
 def command(
     value: Annotated[float, argument("VALUE", "Parameter of the surface.")],
     source: options.FromOption,
-    tolerance: Annotated[
-        float,
-        option("T", "Largest maximum error allowed under the metric, relative to the source's."),
-    ] = 0.05,
+    tolerance: Annotated[float, _TOLERANCE] = 0.05,
     metric: options.MetricOption = "environment",
     exposure: options.ExposureOption = None,
     gamma: options.FixedGammaOption = None,
@@ -62,23 +61,23 @@ def command(
     rows, reason = recommendation.records(), recommendation.reason
     columns, answers = list(rows[0]), recommendation.chosen
     sentence = reason[0].upper() + reason[1:]
-    form = form_of(format_, in_pipe="plain")
+    form = tables.form_of(format_, in_pipe="plain")
     if form == "json":
         asked = {"from": end.label, "value": value, "metric": str(kept), "tolerance": tolerance}
         chosen = {use: vars(candidate) for use, candidate in answers.items()}
         typer.echo(json_text(asked | chosen | {"reason": reason, "candidates": rows}))
     elif form == "markdown":
-        typer.echo(f"{table_text(columns, rows, form)}\n\n{sentence}")
+        typer.echo(f"{tables.table_text(columns, rows, form)}\n\n{sentence}")
     elif form == "table":
         shown = [{heading: row[key] for key, heading in _HEADINGS.items()} for row in rows]
         styles = ["bold" if row["chosen"] else "" if row["within"] else "dim" for row in rows]
         title = f"{end.label} {value:g} within {tolerance:g}, {kept}"
-        print_table(list(shown[0]), shown, title, styles, secondary=("RMSE", "within"))
-        console().print(f"{sentence}\n{_FOOTNOTE}")
+        tables.print_table(list(shown[0]), shown, title, styles, secondary=("RMSE", "within"))
+        tables.console().print(f"{sentence}\n{_FOOTNOTE}")
     else:
         lines = [
-            f"{use} {answer.distribution} {value_text(answer.parameter)} {answer.method}"
+            f"{use} {answer.distribution} {tables.value_text(answer.parameter)} {answer.method}"
             for use, answer in answers.items()
         ]
-        typer.echo("\n".join(lines) if form == "plain" else table_text(columns, rows, form))
-        tell(reason)
+        typer.echo("\n".join(lines) if form == "plain" else tables.table_text(columns, rows, form))
+        process.tell(reason)

@@ -6,26 +6,23 @@ from typing import Annotated, Literal
 
 import typer
 
-from mdfconv.cli import completion
+from mdfconv.cli import completion, tables
 from mdfconv.cli.options import ForceOption, FormatOption, OutputOption, option
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.tables import write_table
 
 # Of a table in a narrow terminal.
 _SECONDARY = ("textbook", "worst", "error_in_eps", "cases", "out_of_range")
+
+_MDF = option("MDF", "Only this distribution; repeatable.", words=completion.distributions)
+_PART = typer.Option(help="Only this part.")
 
 
 def command(
     format_: FormatOption = None,
     output: OutputOption = None,
     force: ForceOption = False,
-    mdf: Annotated[
-        list[str] | None,
-        option("MDF", "Only this distribution; repeatable.", words=completion.distributions),
-    ] = None,
-    part: Annotated[
-        Literal["kernels", "conversions"] | None, typer.Option(help="Only this part.")
-    ] = None,
+    mdf: Annotated[list[str] | None, _MDF] = None,
+    part: Annotated[Literal["kernels", "conversions"] | None, _PART] = None,
 ) -> None:
     """Audit the hard cases: errors against 50-digit values, beside those of the printed formulas.
 
@@ -49,4 +46,4 @@ def command(
     outputs = Outputs(table=output, force=force)
     rows = [finding.record() for finding in audit(mdf or (), part)]
     title = "Hard cases: worst relative errors"
-    write_table(COLUMNS, rows, format_, outputs, title=title, secondary=_SECONDARY)
+    tables.write_table(COLUMNS, rows, format_, outputs, title=title, secondary=_SECONDARY)

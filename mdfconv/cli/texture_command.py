@@ -7,56 +7,48 @@ from typing import Annotated, Literal
 
 import typer
 
-from mdfconv.cli import completion, options
+from mdfconv.cli import completion, options, process, tables
 from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.outputs import Outputs
-from mdfconv.cli.process import tell
-from mdfconv.cli.tables import progress
+
+_SOURCE = option(
+    "MDF:ENCODING",
+    "What the texels are: ggx:alpha, ggx:roughness, ggx:glossiness, likewise "
+    "beckmann; blinn-phong:exponent (N / --exponent-max), blinn-phong:log2 (N = 2^(k v)).",
+    "--from",
+    words=completion.texels,
+)
+_TARGET = option(
+    "MDF:ENCODING", "What they become, as for --from.", "--to", words=completion.texels
+)
+_CHANNEL = option(
+    "C",
+    "r, g, b, a or l (grey), in OpenEXR its name; several as rgb or r,g. Needed if "
+    "there are several.",
+)
+_EXPONENT_MAX = option("N", "Exponent of the brightest texel, for exponent.")
+_LOSSY = flag("--lossy", "Take a JPEG, although it has altered the values.")
+_MAX_PIXELS = option("N", "Largest picture to decode; default 134217728.", min=1)
 
 
 def command(
     context: typer.Context,
     source_file: Annotated[Path, argument("IN", "Texture: PNG, TIFF, TGA or OpenEXR.")],
     output: Annotated[Path, option("OUT", "File to write; not IN.", "--output", "-o")],
-    source: Annotated[
-        str,
-        option(
-            "MDF:ENCODING",
-            "What the texels are: ggx:alpha, ggx:roughness, ggx:glossiness, likewise "
-            "beckmann; blinn-phong:exponent (N / --exponent-max), blinn-phong:log2 (N = 2^(k v)).",
-            "--from",
-            words=completion.texels,
-        ),
-    ],
-    target: Annotated[
-        str,
-        option("MDF:ENCODING", "What they become, as for --from.", "--to", words=completion.texels),
-    ],
-    channel: Annotated[
-        str | None,
-        option(
-            "C",
-            "r, g, b, a or l (grey), in OpenEXR its name; several as rgb or r,g. Needed if "
-            "there are several.",
-        ),
-    ] = None,
+    source: Annotated[str, _SOURCE],
+    target: Annotated[str, _TARGET],
+    channel: Annotated[str | None, _CHANNEL] = None,
     method: options.MethodOption = None,
     metric: options.MetricOption = "environment",
     exposure: options.ExposureOption = None,
     gamma: options.FixedGammaOption = None,
     specular: options.SpecularOption = None,
-    exponent_max: Annotated[
-        float, option("N", "Exponent of the brightest texel, for exponent.")
-    ] = 1000.0,
+    exponent_max: Annotated[float, _EXPONENT_MAX] = 1000.0,
     log2_scale: Annotated[float, option("K", "k of log2; 13 is for exponents up to 8192.")] = 13.0,
     depth: Annotated[Literal["keep", "8", "16"], typer.Option(help="Bits of the result.")] = "keep",
     dither: Annotated[bool, flag("--dither", "Diffuse the errors of rounding to 8 bits.")] = False,
-    lossy: Annotated[
-        bool, flag("--lossy", "Take a JPEG, although it has altered the values.")
-    ] = False,
-    max_pixels: Annotated[
-        int | None, option("N", "Largest picture to decode; default 134217728.", min=1)
-    ] = None,
+    lossy: Annotated[bool, _LOSSY] = False,
+    max_pixels: Annotated[int | None, _MAX_PIXELS] = None,
     png: options.PngOption = None,
     force: options.ForceOption = False,
 ) -> None:
@@ -97,7 +89,7 @@ def command(
             dither=dither,
             lossy=lossy,
             max_pixels=max_pixels,
-            progress=progress,
+            progress=tables.progress,
             fill=files.fill,
         )
         if png:
@@ -105,11 +97,11 @@ def command(
 
             files.add(png, draw_histograms(report, f"{source_file.name} → {output.name}"))
     for note in report.notes():
-        tell(f"note: {note}")
+        process.tell(f"note: {note}")
     keeps = f"keeps the {report.keeps}" if report.keeps else "the same lobes"
-    tell(f"wrote {output}: {report.target}, {keeps}")
+    process.tell(f"wrote {output}: {report.target}, {keeps}")
     if png:
-        tell(f"wrote {png}")
+        process.tell(f"wrote {png}")
 
 
 def _check_given(context: typer.Context, *names: str) -> None:

@@ -73,12 +73,8 @@ class DirectionalSamples:
 
     def select(self, rows: Any) -> DirectionalSamples:
         """Return some of the samples, by a mask or by indices."""
-        return replace(
-            self,
-            incident=self.incident[rows],
-            outgoing=self.outgoing[rows],
-            values=self.values[rows],
-        )
+        names = "incident", "outgoing", "values"
+        return replace(self, **{name: getattr(self, name)[rows] for name in names})
 
 
 Measurements: TypeAlias = Samples | DirectionalSamples

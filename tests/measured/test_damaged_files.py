@@ -66,6 +66,13 @@ def check_result(reading):
         assert ((samples.beta >= 0) & (samples.beta <= np.pi / 2)).all()
 
 
+def test_signalling_nan_of_a_tensor_file_does_not_warn(tmp_path):
+    ndf = np.array([[1, 1, 0x7F810000, 1]], "<u4").view("<f4")
+    path = tmp_path / "a.bsdf"
+    path.write_bytes(tensor_bytes({"ndf": ndf}))
+    check(path)
+
+
 @SETTINGS
 @given(content=st.binary(max_size=300), name=st.sampled_from(["a.txt", "a.bsdf", "a.binary"]))
 def test_arbitrary_bytes(tmp_path, content, name):

@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
 from mdfconv.brdf.microfacet import direction
 from mdfconv.distributions.evaluation import Array
-from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers import base
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source
 from mdfconv.measured.readers.tables import parse_table
@@ -53,7 +51,7 @@ def _read(source: Source, options: ReadOptions) -> Measurements:
     options.refuse(path, "ALTA's header names its columns")
     tags = dict(_TAG.findall("\n".join(base.decode_head(source.head).splitlines())))
     parametrization = tags.get("PARAM_IN", "").upper()
-    inputs, outputs = _dimensions(path, tags.get("DIM", ""), parametrization)
+    inputs, outputs = _dimensions(source, tags.get("DIM", ""), parametrization)
     numbers = _numbers(source, tags, inputs, outputs)
     x, values = numbers[:, :inputs], numbers[:, inputs : inputs + outputs]
     names = ("R", "G", "B") if outputs == 3 else tuple(str(n + 1) for n in range(outputs))
@@ -74,23 +72,20 @@ def _read(source: Source, options: ReadOptions) -> Measurements:
         return base.samples_of_vectors(path, light, view, values, names, notes)
 
 
-def _dimensions(path: Path, text: str, parametrization: str) -> tuple[int, int]:
+def _dimensions(source: Source, text: str, parametrization: str) -> tuple[int, int]:
     """Return how many inputs and outputs there are, if they go with the parametrization."""
     words = text.split()
     if len(words) < 2 or not all(re.fullmatch("[0-9]{1,3}", word) for word in words[:2]):
-        raise MdfconvError(f"{path}: ALTA data of dimension '{text}'", "two whole numbers go there")
+        raise source.error(f"ALTA data of dimension '{text}'", "two whole numbers go there")
     inputs, outputs = map(int, words[:2])
     sizes = {name: size for name, (size, _) in _TWO_DIRECTIONS.items()}
     known = dict.fromkeys(_ONE_ANGLE, 1) | sizes
     if parametrization not in known:
-        raise MdfconvError(
-            f"{path}: ALTA input parametrization '{parametrization}'", f"known: {', '.join(known)}"
-        )
+        reason = f"ALTA input parametrization '{parametrization}'"
+        raise source.error(reason, f"known: {', '.join(known)}")
     if inputs != known[parametrization]:
-        raise MdfconvError(
-            f"{path}: ALTA data of {inputs} inputs, where {parametrization} has "
-            f"{known[parametrization]}"
-        )
+        takes = known[parametrization]
+        raise source.error(f"ALTA data of {inputs} inputs, where {parametrization} has {takes}")
     return inputs, outputs
 
 
@@ -100,28 +95,26 @@ def _numbers(source: Source, tags: dict[str, str], inputs: int, outputs: int) ->
         return _binary(source, tags, inputs + outputs)
     numbers = parse_table(source.path, source.lines()).numbers
     if not 1 <= outputs <= numbers.shape[1] - inputs:
-        raise MdfconvError(
-            f"{source.path}: {numbers.shape[1]} columns do not hold {inputs} + {outputs} dimensions"
-        )
+        width = numbers.shape[1]
+        raise source.error(f"{width} columns do not hold {inputs} + {outputs} dimensions")
     return numbers
 
 
 def _binary(source: Source, tags: dict[str, str], width: int) -> Array:
-    path, content = source.path, source.content
+    content = source.content
     if tags.get("PRECISION", "") != "ieee754-double" or tags.get("VERSION", "") != "0":
-        raise MdfconvError(f"{path}: ALTA binary data", "only version 0 of ieee754-double is read")
+        raise source.error("ALTA binary data", "only version 0 of ieee754-double is read")
     count = tags.get("SAMPLE_COUNT", "")
     if not re.fullmatch("[0-9]{1,12}", count):
-        raise MdfconvError(f"{path}: ALTA binary data without a count of samples")
+        raise source.error("ALTA binary data without a count of samples")
     order = ">" if tags.get("ENDIAN", "little").lower() == "big" else "<"
     start = content.find(b"\n", content.find(_BEGIN)) + 1 if _BEGIN in source.head else 0
     size = int(count) * width
     if not start or len(content) - start < 8 * size:
-        raise MdfconvError(
-            f"{path}: truncated: {len(content) - start} bytes where {count} samples take {8 * size}"
-        )
+        rest = len(content) - start
+        raise source.error(f"truncated: {rest} bytes where {count} samples take {8 * size}")
     if not size:
-        raise MdfconvError(f"{path}: no samples")
+        raise source.error("no samples")
     return np.frombuffer(content, f"{order}f8", size, start).astype(float).reshape(-1, width)
 
 

@@ -81,6 +81,11 @@ class Source:
         """The first bytes, by which a reader knows its format."""
         return self.content[:_HEAD_BYTES]
 
+    def error(self, reason: str, hint: str = "", *, line: int | None = None) -> MdfconvError:
+        """Return an error about the file, or about one of its lines."""
+        place = "" if line is None else f", line {line}"
+        return MdfconvError(f"{self.path}{place}: {reason}", hint)
+
     def lines(self) -> list[str]:
         """Return its lines: UTF-8, or what its byte order mark says; no control characters.
 
@@ -92,10 +97,8 @@ class Source:
             return content.decode(encoding).translate(_CONTROLS).splitlines()
         except UnicodeDecodeError as error:
             name = "UTF-16" if encoding == "utf-16" else "UTF-8"
-            raise MdfconvError(
-                f"{self.path}: not {name} text (byte {error.start + 1})",
-                "convert its encoding first",
-            ) from None
+            reason = f"not {name} text (byte {error.start + 1})"
+            raise self.error(reason, "convert its encoding first") from None
 
 
 @dataclass(frozen=True)

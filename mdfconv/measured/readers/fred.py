@@ -6,11 +6,9 @@ The azimuth of incidence is that of the light's travel: the specular direction h
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 
-from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, known_by
 from mdfconv.measured.samples import DirectionalSamples, directional_samples
 
@@ -20,8 +18,7 @@ _COMMENTS = ("!", "#", "//")
 
 
 def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
-    path = source.path
-    options.refuse(path, "the header of FRED's format says what its numbers are")
+    options.refuse(source.path, "the header of FRED's format says what its numbers are")
     scale, to_radians = 1.0, np.pi / 180
     incidence: list[float] = []
     rows: list[list[float]] = []
@@ -30,46 +27,44 @@ def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
         if not words or line.lstrip().startswith(_COMMENTS) or words[0].lower() == "type":
             continue
         if words[0].lower() == "format":
-            scale, to_radians = _format(path, number, line)
+            scale, to_radians = _format(source, number, line)
             continue
-        numbers = _numbers(path, number, line)
+        numbers = _numbers(source, number, line)
         if len(numbers) == 2:
             incidence = numbers
         elif len(numbers) == 3 and incidence:
             rows.append([*incidence, *numbers])
         else:
-            raise MdfconvError(
-                f"{path}, line {number}: {len(numbers)} numbers"
-                + ("" if incidence else " before an incidence"),
-                "two are an incidence (θ φ), three a row (θ φ value)",
-            )
+            reason = f"{len(numbers)} numbers" + ("" if incidence else " before an incidence")
+            hint = "two are an incidence (θ φ), three a row (θ φ value)"
+            raise source.error(reason, hint, line=number)
     if not rows:
-        raise MdfconvError(f"{path}: no rows θ φ value")
+        raise source.error("no rows θ φ value")
     table = np.array(rows)
     theta_i, phi_i, theta_o, phi_o = table[:, :4].T * to_radians
     with np.errstate(over="ignore"):
         values = table[:, 4:] * scale
-    return directional_samples(path, theta_i, phi_i + np.pi, theta_o, phi_o, values, ("value",))
+    return directional_samples(
+        source.path, theta_i, phi_i + np.pi, theta_o, phi_o, values, ("value",)
+    )
 
 
-def _format(path: Path, number: int, line: str) -> tuple[float, float]:
+def _format(source: Source, number: int, line: str) -> tuple[float, float]:
     """Return the scale of the values and the factor to radians that a line of settings gives."""
     settings = {key.lower(): value for key, value in _SETTING.findall(line)}
     angles = settings.get("angles", "deg").lower()
     if angles not in ("deg", "rad") or settings.get("bsdf", "value").lower() != "value":
-        raise MdfconvError(
-            f"{path}, line {number}: {line.strip()[:60]}",
-            "angles=deg or angles=rad, and bsdf=value are read",
-        )
-    (scale,) = _numbers(path, number, settings.get("scale", "1"))
+        hint = "angles=deg or angles=rad, and bsdf=value are read"
+        raise source.error(line.strip()[:60], hint, line=number)
+    (scale,) = _numbers(source, number, settings.get("scale", "1"))
     return scale, np.pi / 180 if angles == "deg" else 1.0
 
 
-def _numbers(path: Path, number: int, line: str) -> list[float]:
+def _numbers(source: Source, number: int, line: str) -> list[float]:
     try:
         return [float(word) for word in line.replace(",", " ").split()]
     except ValueError:
-        raise MdfconvError(f"{path}, line {number}: not numbers: {line.strip()[:60]}") from None
+        raise source.error(f"not numbers: {line.strip()[:60]}", line=number) from None
 
 
 READER = Reader("FRED", known_by(_KNOWN_BY), _read)

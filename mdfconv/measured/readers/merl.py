@@ -34,11 +34,8 @@ def _cells(source: Source, count: int) -> DirectionalSamples:
     planes = _planes(source)
     _, half, difference, azimuth = planes.shape
     generator = np.random.default_rng(_SEED)
-    theta_d, phi_d = np.meshgrid(
-        np.arange(difference) / difference * (np.pi / 2),
-        np.arange(azimuth) / azimuth * np.pi,
-        indexing="ij",
-    )
+    axes = np.arange(difference) / difference * (np.pi / 2), np.arange(azimuth) / azimuth * np.pi
+    theta_d, phi_d = np.meshgrid(*axes, indexing="ij")
     zero = np.zeros(1)
     wanted = max(1, -(-count // half))
     directions, values = [], []
@@ -81,14 +78,14 @@ def _planes(source: Source) -> Array:
     header = _dimensions(source.head)
     if header is None:
         shown = np.frombuffer(source.head[: min(_HEADER_BYTES, size // 4 * 4)], "<i4")
-        raise MdfconvError(f"{source.path}: not a MERL file: its dimensions are {shown.tolist()}")
+        raise source.error(f"not a MERL file: its dimensions are {shown.tolist()}")
     half, difference, azimuth = header
     expected = _HEADER_BYTES + 8 * 3 * half * difference * azimuth
     if size != expected:
         what = "truncated" if size < expected else "too long"
-        raise MdfconvError(
-            f"{source.path}: {what}: {size} bytes where {half} × {difference} × {azimuth} samples "
-            f"of three channels take {expected}"
+        raise source.error(
+            f"{what}: {size} bytes where {half} × {difference} × {azimuth} samples of three "
+            f"channels take {expected}"
         )
     numbers = np.frombuffer(source.content, "<f8", offset=_HEADER_BYTES)
     return numbers.reshape(3, half, difference, azimuth)

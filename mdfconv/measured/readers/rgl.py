@@ -8,14 +8,11 @@ of the authors' loader), φ along the first axis.
 from __future__ import annotations
 
 import math
-import mmap
 import struct
-from pathlib import Path
 
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
-from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source
 from mdfconv.measured.samples import Samples, samples
 
@@ -26,21 +23,15 @@ _TYPES = (None, "u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f
 _MOST_DIMENSIONS = 8
 
 
-def _recognizes(name: str, head: bytes) -> bool:
-    return head.startswith(_SIGNATURE)
-
-
 def _read(source: Source, options: ReadOptions) -> Samples:
     options.refuse(source.path, "a tensor file has no columns")
     wanted = _fields(source)
     density = wanted.get("ndf")
     if density is None or density.ndim != 2 or min(density.shape) < 1 or density.shape[1] < 2:
-        raise MdfconvError(
-            f"{source.path}: no table 'ndf', the distribution of normals, with two axes",
-            f"there are {', '.join(wanted) or 'none'}",
-        )
+        reason = "no table 'ndf', the distribution of normals, with two axes"
+        raise source.error(reason, f"there are {', '.join(wanted) or 'none'}")
     theta = (np.arange(density.shape[1]) / (density.shape[1] - 1)) ** 2 * (np.pi / 2)
-    values = _around(density.astype(float))
+    values = _around(density)
     notes = ["the measured distribution of normals is read, not the reflectance"]
     azimuths = wanted.get("phi_i")
     if azimuths is not None and azimuths.size > 2:
@@ -50,11 +41,13 @@ def _read(source: Source, options: ReadOptions) -> Samples:
 
 def _around(density: Array) -> Array:
     """Return the mean over azimuth, whose first and last row are one direction."""
-    if len(density) == 1:
-        return density[0]
-    weight = np.ones(len(density))
-    weight[[0, -1]] = 0.5
+    # A damaged number can be a NaN that warns when it is cast.
     with np.errstate(all="ignore"):
+        density = density.astype(float)
+        if len(density) == 1:
+            return density[0]
+        weight = np.ones(len(density))
+        weight[[0, -1]] = 0.5
         return weight @ density / weight.sum()
 
 
@@ -66,22 +59,19 @@ def _fields(source: Source) -> dict[str, Array]:
     MdfconvError
         If the file is truncated or of another version.
     """
-    path, content = source.path, source.content
-    position = len(_SIGNATURE)
-    (*version, count), position = _unpack(path, content, "<BBI", position)
+    content, position = source.content, len(_SIGNATURE)
+    (*version, count), position = _unpack(source, "<BBI", position)
     if tuple(version) != _VERSION:
-        raise MdfconvError(
-            f"{path}: tensor file of version {version[0]}.{version[1]}", "only 1.0 is read"
-        )
+        raise source.error(f"tensor file of version {version[0]}.{version[1]}", "only 1.0 is read")
     fields = {}
     for _ in range(count):
-        (length,), position = _unpack(path, content, "<H", position)
+        (length,), position = _unpack(source, "<H", position)
         name = content[position : position + length].decode("ascii", errors="backslashreplace")
         name = name if name.isprintable() else repr(name)
-        (dimensions, kind, offset), position = _unpack(path, content, "<HBQ", position + length)
+        (dimensions, kind, offset), position = _unpack(source, "<HBQ", position + length)
         if dimensions > _MOST_DIMENSIONS:
-            raise MdfconvError(f"{path}: damaged: table '{name}' has {dimensions} axes")
-        shape, position = _unpack(path, content, f"<{dimensions}Q", position)
+            raise source.error(f"damaged: table '{name}' has {dimensions} axes")
+        shape, position = _unpack(source, f"<{dimensions}Q", position)
         fields[name] = _table(source, name, shape, kind, offset)
     return fields
 
@@ -89,23 +79,21 @@ def _fields(source: Source) -> dict[str, Array]:
 def _table(source: Source, name: str, shape: tuple[int, ...], kind: int, offset: int) -> Array:
     form = _TYPES[kind] if kind < len(_TYPES) else None
     if form is None:
-        raise MdfconvError(f"{source.path}: damaged: table '{name}' is of unknown type {kind}")
+        raise source.error(f"damaged: table '{name}' is of unknown type {kind}")
     count = math.prod(shape)
     if offset + count * np.dtype(form).itemsize > len(source.content):
-        raise MdfconvError(f"{source.path}: truncated: table '{name}' goes beyond its end")
+        raise source.error(f"truncated: table '{name}' goes beyond its end")
     if not count:
         return np.zeros(0)
     return np.frombuffer(source.content, form, count, offset).reshape(shape)
 
 
-def _unpack(
-    path: Path, content: bytes | mmap.mmap, form: str, position: int
-) -> tuple[tuple[int, ...], int]:
+def _unpack(source: Source, form: str, position: int) -> tuple[tuple[int, ...], int]:
     size = struct.calcsize(form)
-    part = content[position : position + size]
+    part = source.content[position : position + size]
     if len(part) < size:
-        raise MdfconvError(f"{path}: truncated within its table of contents")
+        raise source.error("truncated within its table of contents")
     return struct.unpack(form, part), position + size
 
 
-READER = Reader("RGL", _recognizes, _read)
+READER = Reader("RGL", lambda name, head: head.startswith(_SIGNATURE), _read)

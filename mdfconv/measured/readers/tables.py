@@ -286,10 +286,8 @@ def _headings(
     cells = [form.names(line, width) for _, line in headers]
     names, units = (*cells, [], [])[:2]
     if headers and len(names) != width:
-        raise MdfconvError(
-            f"{path}, line {headers[0][0]}: names {len(names)} columns where {width} are",
-            _COMMENT_HINT,
-        )
+        place = f"{path}, line {headers[0][0]}"
+        raise MdfconvError(f"{place}: names {len(names)} columns where {width} are", _COMMENT_HINT)
     is_of_units = len(units) == width and all(_UNIT.fullmatch(unit) for unit in units)
     if len(headers) > 1 and not is_of_units:
         raise _no_numbers(path, *headers[1])

@@ -10,16 +10,11 @@ import numpy as np
 
 from mdfconv.brdf.microfacet import mirrored, polar_angle
 from mdfconv.distributions.evaluation import Array
+from mdfconv.measured import samples
 from mdfconv.measured.readers import tables
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source
 from mdfconv.measured.readers.tables import Role, Table, parse_table
-from mdfconv.measured.samples import (
-    UNITS,
-    DirectionalSamples,
-    Measurements,
-    directional_samples,
-    samples,
-)
+from mdfconv.measured.samples import UNITS, DirectionalSamples, Measurements
 from mdfconv.registry import unknown_name
 
 # What an angle of a table of one angle can be.
@@ -77,10 +72,8 @@ class _Columns:
         incidence = None if Role.theta_i in columns else self._incidence()
         if Role.theta_o not in columns or not (Role.theta_i in columns or incidence):
             if any(getattr(self._options, role.name) for role in _DIRECTIONS):
-                raise table.error(
-                    "no column of the zenith of both directions",
-                    f"name both; there are {', '.join(table.names)}",
-                )
+                hint = f"name both; there are {', '.join(table.names)}"
+                raise table.error("no column of the zenith of both directions", hint)
             return None
         channels, values, value_notes = self._values(columns.values())
         unit = self._unit_of_directions(columns)
@@ -100,7 +93,9 @@ class _Columns:
         light = angles[Role.theta_i], angles[Role.phi_i]
         view = angles[Role.theta_o], angles[Role.phi_o]
         notes = (*self._notes, *value_notes)
-        return _oriented(directional_samples(table.path, *light, *view, values, channels, notes))
+        return _oriented(
+            samples.directional_samples(table.path, *light, *view, values, channels, notes)
+        )
 
     def one_angle(self) -> Measurements:
         """Return samples of one angle, or of two directions of which one is the normal."""
@@ -116,19 +111,16 @@ class _Columns:
             theta = UNITS[unit].to_radians(angle)
             zero = np.zeros_like(theta)
             still = INCIDENT if meaning == REFLECTED else REFLECTED
-            note = (
-                f"the angle is that of the {meaning} direction; the {still} one is taken to be the "
-                "normal"
-            )
-            first, second = (theta, zero) if meaning == INCIDENT else (zero, theta)
-            return directional_samples(
-                table.path, first, zero, second, zero, values, channels, (*notes, note)
-            )
+            taken = f"the {still} one is taken to be the normal"
+            notes += (f"the angle is that of the {meaning} direction; {taken}",)
+            zeniths = (theta, zero) if meaning == INCIDENT else (zero, theta)
+            angles = zeniths[0], zero, zeniths[1], zero
+            return samples.directional_samples(table.path, *angles, values, channels, notes)
         if not (table.is_named and tables.is_half(table.names[column])):
             other = "" if meaning else ", not of a direction"
             read = f"{table.listed([column])} is read as the angle between normal and half vector"
             notes += (read + other,)
-        return samples(table.path, angle, unit, values, channels, "ndf", notes)
+        return samples.samples(table.path, angle, unit, values, channels, "ndf", notes)
 
     def _by_role(self) -> dict[Role, int]:
         """Return the columns of angles by what they hold."""
@@ -143,11 +135,9 @@ class _Columns:
             if role is Role.angle:
                 bare.append(index)
             elif role in columns:
-                raise table.error(
-                    f"{table.listed([columns[role], index])} are both the {role}",
-                    "choose one",
-                    argument=role.name if role in _DIRECTIONS else "",
-                )
+                both = table.listed([columns[role], index])
+                argument = role.name if role in _DIRECTIONS else ""
+                raise table.error(f"{both} are both the {role}", "choose one", argument=argument)
             else:
                 columns[role] = index
         if Role.theta_i in columns and Role.theta_o not in columns and len(bare) == 1:
@@ -163,11 +153,9 @@ class _Columns:
         several = len(table.names) > 2
         if not table.is_named:
             if several and tables.is_counting(table.numbers[:, 0]):
-                raise table.error(
-                    "column 1 counts 0, 1, 2 … or 1, 2, 3 …: an index, or degrees",
-                    f"choose the column of angles, from 1 to {len(table.names)}",
-                    argument="angle",
-                )
+                reason = "column 1 counts 0, 1, 2 … or 1, 2, 3 …: an index, or degrees"
+                hint = f"choose the column of angles, from 1 to {len(table.names)}"
+                raise table.error(reason, hint, argument="angle")
             self._notes += ["no names of columns: the first is taken for the angle"] * several
             return 0
         angles = [index for index, name in self._names.items() if tables.is_angle(name)]
@@ -176,12 +164,9 @@ class _Columns:
         rest = [index for index in self._names if index not in self._counting]
         others = [index for index in rest[1:] if not tables.is_value(table.names[index])]
         if angles or not rest or (len(rest) > 2 and others):
-            raise table.error(
-                f"{'several columns are' if angles else 'no column is'} called an angle; "
-                f"there are {', '.join(table.names)}",
-                "choose the column of angles",
-                argument="angle",
-            )
+            which = "several columns are" if angles else "no column is"
+            reason = f"{which} called an angle; there are {', '.join(table.names)}"
+            raise table.error(reason, "choose the column of angles", argument="angle")
         self._notes.append(f"{table.listed(rest[:1])} is taken for the angle")
         return rest[0]
 
@@ -196,20 +181,16 @@ class _Columns:
         for index, name in self._names.items():
             different = np.unique(table.numbers[:, index]).size
             if tables.is_wavelength(name) and different > 1:
-                raise table.error(
-                    f"column '{name}' has {different} wavelengths, whose values would be mixed",
-                    "keep the rows of one",
-                )
+                reason = f"column '{name}' has {different} wavelengths, whose values would be mixed"
+                raise table.error(reason, "keep the rows of one")
         if self._options.values:
             return [table.column(name) for name in self._options.values], []
         counting = [index for index in self._counting if index not in angles]
         rest = [index for index in range(len(table.names)) if index not in (*angles, *counting)]
         chosen = [index for index in rest if tables.is_value(self._names.get(index, ""))] or rest
         if not chosen:
-            raise table.error(
-                f"{'one column is' if len(table.names) == 1 else 'the columns are'} not enough",
-                "it takes an angle and a value",
-            )
+            which = "one column is" if len(table.names) == 1 else "the columns are"
+            raise table.error(f"{which} not enough", "it takes an angle and a value")
         remark = "counts the rows and is passed over"
         notes = [f"column '{table.names[index]}' {remark}" for index in counting]
         others = [index for index in rest if index not in chosen]
@@ -309,38 +290,38 @@ class _Columns:
         self._notes.append(note)
 
 
-def _oriented(samples: DirectionalSamples) -> DirectionalSamples:
+def _oriented(data: DirectionalSamples) -> DirectionalSamples:
     """Return samples with the incident directions turned by 180° if the lobe lies there.
 
     Azimuths of incidence are taken to be those towards the light; a note says if the file turned
     out otherwise, or left it open.
     """
-    turned = replace(samples, incident=mirrored(samples.incident))
-    advantage = _fall(turned) - _fall(samples)
+    turned = replace(data, incident=mirrored(data.incident))
+    advantage = _fall(turned) - _fall(data)
     if advantage < -_CLEAR:
         note = (
             "the lobe lies where incident and outgoing azimuth are the same: the azimuth of "
             "incidence is that of the light's travel and is turned by 180°"
         )
-        return replace(turned, notes=(*samples.notes, note))
-    is_oblique = np.hypot(*samples.incident[:, :2].T).max() > 1e-6
+        return replace(turned, notes=(*data.notes, note))
+    is_oblique = np.hypot(*data.incident[:, :2].T).max() > 1e-6
     if advantage > _CLEAR or not is_oblique:
-        return samples
+        return data
     note = (
         "the values do not tell on which side the mirror direction lies: it is taken to be "
         "opposite to the azimuth of incidence"
     )
-    return replace(samples, notes=(*samples.notes, note))
+    return replace(data, notes=(*data.notes, note))
 
 
-def _fall(samples: DirectionalSamples) -> float:
+def _fall(data: DirectionalSamples) -> float:
     """Return how far the values gather at a small angle of the half vector: negative if so.
 
     It is the mean angle with the values as weights, every channel as much, less the one without,
     in standard deviations.
     """
-    beta = polar_angle(samples.half)
-    positive = np.maximum(samples.values, 0)
+    beta = polar_angle(data.half)
+    positive = np.maximum(data.values, 0)
     largest = positive.max(axis=0)
     weight = np.sum(positive / np.where(largest > 0, largest, 1), axis=1)
     spread = float(np.std(beta))

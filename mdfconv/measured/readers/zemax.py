@@ -8,7 +8,7 @@ and the azimuth about it, 0 towards the normal of the surface and counter-clockw
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,11 +29,11 @@ _CHANNELS = {"monochrome": "value", "tristimulusx": "X", "tristimulusy": "Y", "t
 class _Words:
     """A place in a text that moves on from word to word."""
 
-    def __init__(self, path: Path, lines: Iterable[str]) -> None:
-        self._path = path
+    def __init__(self, source: Source) -> None:
+        self._source = source
         self._words = [
             (number, word)
-            for number, line in enumerate(lines, start=1)
+            for number, line in enumerate(source.lines(), start=1)
             if not line.lstrip().startswith("#")
             for word in line.split()
         ]
@@ -47,7 +47,7 @@ class _Words:
         """Return the next word; raise `MdfconvError` if the text ends before it."""
         word = self.peek()
         if word is None:
-            raise MdfconvError(f"{self._path}: truncated: it ends before {what}")
+            raise self._source.error(f"truncated: it ends before {what}")
         self._at += 1
         return word
 
@@ -67,7 +67,7 @@ class _Words:
     def numbers(self, count: int, what: str) -> Array:
         """Return the next numbers, shape (count,)."""
         if len(self._words) - self._at < count:
-            raise MdfconvError(f"{self._path}: truncated: it ends within {what}")
+            raise self._source.error(f"truncated: it ends within {what}")
         word = ""
         try:
             return np.array([float(word := self.next(what)) for _ in range(count)])
@@ -76,25 +76,23 @@ class _Words:
 
     def error(self, reason: str) -> MdfconvError:
         """Return an error about the word that was last read."""
-        number = self._words[max(self._at - 1, 0)][0]
-        return MdfconvError(f"{self._path}, line {number}: {reason}")
+        return self._source.error(reason, line=self._words[max(self._at - 1, 0)][0])
 
 
 def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
-    path = source.path
-    options.refuse(path, "the header of Zemax's format says what its numbers are")
-    words = _Words(path, source.lines())
-    axes = _header(path, words)
+    options.refuse(source.path, "the header of Zemax's format says what its numbers are")
+    words = _Words(source)
+    axes = _header(source, words)
     channels, tables = [], []
     while (word := words.peek()) is not None and word.lower() in _CHANNELS:
         channels.append(_CHANNELS[words.next("data").lower()])
         tables.append(_channel(words, [axis.size for axis in axes]))
     if not tables or words.peek() is not None:
         raise words.error(f"no data, or something else than data: {str(words.peek())[:30]}")
-    return _samples(path, axes, np.stack(tables, axis=-1), channels)
+    return _samples(source.path, axes, np.stack(tables, axis=-1), channels)
 
 
-def _header(path: Path, words: _Words) -> list[Array]:
+def _header(source: Source, words: _Words) -> list[Array]:
     """Return the angles of each axis, radians, and move on to the data."""
     angles: dict[str, Array] = {}
     while (key := (words.peek() or "").lower()) not in _CHANNELS:
@@ -109,9 +107,9 @@ def _header(path: Path, words: _Words) -> list[Array]:
             raise words.error(f"'{key[:30]}' is no word of Zemax's header")
     missing = [key for key in _ANGLES[1:] if key not in angles]
     if missing:
-        raise MdfconvError(f"{path}: the header lacks {', '.join(missing)}")
+        raise source.error(f"the header lacks {', '.join(missing)}")
     if not all(np.isfinite(values).all() for values in angles.values()):
-        raise MdfconvError(f"{path}: an angle of the header is not finite")
+        raise source.error("an angle of the header is not finite")
     return [angles.get(key, np.zeros(1)) for key in _ANGLES]
 
 

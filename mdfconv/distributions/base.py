@@ -311,12 +311,20 @@ class Distribution(ABC):
     @overload
     def normalized(self, beta: ArrayLike, parameter: Any, **options: Unpack[Options]) -> Array: ...
 
-    def normalized(self, beta: ArrayLike, parameter: Any, **options: Unpack[Options]) -> Any:
+    def normalized(
+        self,
+        beta: ArrayLike,
+        parameter: Any,
+        *,
+        phi: ArrayLike | None = None,
+        gamma: ArrayLike | None = None,
+        threads: int = 1,
+    ) -> Any:
         """Evaluate the normalized form D, for which ∫ D cos β dω = 1.
 
         Parameters, shapes and errors are those of `unit`; the result is in 1/sr.
         """
-        return self._evaluate("_normalized", beta, parameter, **options)
+        return self._evaluate("_normalized", beta, parameter, phi, gamma, threads)
 
     @overload
     def cumulative(self, beta: float, parameter: float, *, complement: bool = ...) -> float: ...

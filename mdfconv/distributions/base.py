@@ -480,9 +480,7 @@ class Distribution(ABC):
             # F is a function of tan β / p, and dF = 2π D sin β cos β dβ.
             lobe = self._lobe(beta, parameter) * self._at_normal(parameter)
             return share, -0.5 * np.pi * lobe * np.square(np.sin(2 * beta))
-        above, below = (
-            self._cumulative(beta, parameter * np.exp(step))[0] for step in (_STEP, -_STEP)
-        )
+        above, below = (self._cumulative(beta, parameter * np.exp(s))[0] for s in (_STEP, -_STEP))
         return share, (above - below) / (2 * _STEP)
 
     def _off_axis_maximum(self, parameter: Array) -> Array | None:

@@ -141,10 +141,7 @@ def _packed(values: Any, kind: DTypeLike) -> str:
 
 def _rounded(values: Array, digits: int = 8) -> list[Any]:
     """Return an array as lists of numbers with few digits, for they are read as text."""
-    return [
-        _rounded(value, digits) if np.ndim(value) else float(f"{value:.{digits}g}")
-        for value in values
-    ]
+    return [_rounded(v, digits) if np.ndim(v) else float(f"{v:.{digits}g}") for v in values]
 
 
 def _grid(low: float, high: float, count: int) -> Array:

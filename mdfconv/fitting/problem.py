@@ -117,12 +117,9 @@ class FitProblem:
         weight = weight * self.metric.weight(beta)
         signal = self.metric.signal(self._source, beta, self._source_parameter, self._peak)
         shape = (*candidates.shape, beta.shape[1])
-        residual = self.metric.signal(
-            self.target,
-            np.broadcast_to(beta[:, None, :], shape),
-            candidates[:, :, None],
-            self._peak[:, :, None],
-        )
+        angles = np.broadcast_to(beta[:, None, :], shape)
+        rest = candidates[:, :, None], self._peak[:, :, None]
+        residual = self.metric.signal(self.target, angles, *rest)
         residual -= signal[:, None, :]
         return np.einsum("ik,ijk,ijk->ij", weight, residual, residual)
 

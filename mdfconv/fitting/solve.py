@@ -38,12 +38,11 @@ def errors_of_many(function: Callable[[Array], Array], parameter: Array) -> Arra
     if parameter.size < 2 * _COARSE or not np.ptp(parameter) > 0:
         return function(parameter)
     low, high = parameter.min(), parameter.max()
-    (errors,), _ = interpolated(
-        lambda x: function(np.clip(np.exp(x), low, high))[None],
-        np.log(parameter),
-        _COARSE,
-        _COARSE_TOLERANCE,
-    )
+
+    def knots(x: Array) -> Array:
+        return function(np.clip(np.exp(x), low, high))[None]
+
+    (errors,), _ = interpolated(knots, np.log(parameter), _COARSE, _COARSE_TOLERANCE)
     rest = np.isnan(errors)
     errors[rest] = function(parameter[rest])
     return errors

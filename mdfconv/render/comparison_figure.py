@@ -131,10 +131,7 @@ def _draw_differences(table: _PictureTable, comparison: PictureComparison) -> fl
 
     The place beneath the reference shows the sphere of which the pictures are a part.
     """
-    differences = [
-        [comparison.difference(rendering) for rendering in renderings]
-        for renderings in comparison.rows.values()
-    ]
+    differences = [[*map(comparison.difference, row)] for row in comparison.rows.values()]
     scale = _round_up(max(np.abs(one).max() for row in differences for one in row))
     light = comparison.scene.exposure * comparison.reference.image
     sphere = displayed_pixels(light + _background(Frame(comparison.scene.size)))

@@ -13,6 +13,7 @@ Examples
 0.23552
 """
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -58,8 +59,32 @@ __all__ = [
     "register_metric",
 ]
 
-# Imported when they are asked for: the command line takes a Ctrl-C during imports, which those of
-# the package itself would precede.
+
+def lazy_face(package: str, homes: dict[str, tuple[str, ...]]) -> Callable[[str], Any]:
+    """Return the `__getattr__` of a package whose names are imported when they are asked for.
+
+    `homes` has the names by the modules of the package that define them; the modules are found,
+    too.
+    """
+    modules = {name: module for module, names in homes.items() for name in names}
+
+    def get(name: str) -> Any:
+        if name in modules:
+            value = getattr(import_module(f"{package}.{modules[name]}"), name)
+            setattr(import_module(package), name, value)
+            return value
+        if not name.startswith("_"):
+            from importlib.util import find_spec
+
+            if find_spec(f"{package}.{name}"):
+                return import_module(f"{package}.{name}")
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+
+    return get
+
+
+# Lazily, as the command line takes a Ctrl-C during imports, which those of the package itself
+# would precede.
 _ROOMS = {
     "conversion": ("Conversion", "convert", "explain", "list_methods"),
     "distributions": ("Distribution", "distribution", "list_distributions", "register"),
@@ -75,20 +100,7 @@ _ROOMS = {
         "convert_texture_file",
     ),
 }
-_HOMES = {name: room for room, names in _ROOMS.items() for name in names}
-
-
-def __getattr__(name: str) -> Any:
-    """Import what was asked for by its name: a public one, or a module of the package."""
-    if name in _HOMES:
-        value = globals()[name] = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-        return value
-    if not name.startswith("_"):
-        from importlib.util import find_spec
-
-        if find_spec(f"{__name__}.{name}"):
-            return import_module(f"{__name__}.{name}")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = lazy_face(__name__, _ROOMS)
 
 
 def __dir__() -> list[str]:

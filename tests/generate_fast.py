@@ -68,7 +68,8 @@ class Pair(MapMaker):
         attempt = self.curve(parameter)
         got, cold = attempt.fits, ~attempt.settled
         if cold.any():
-            fits = cold_fit(self.source, parameter[cold], self.target, self.metric)
+            task = ConversionTask(self.source, parameter[cold], self.target, self.metric)
+            fits = cold_fit(task)
             got[cold] = fits.parameter
         with np.errstate(invalid="ignore"):
             return np.where(got >= LEAST_TARGET.get(self.names[1], 0), got, np.nan)

@@ -42,6 +42,18 @@ def test_every_public_name_has_a_home():
         _ = mdfconv.nothing
 
 
+def test_fits_are_found_in_their_package():
+    assert mdfconv.fitting.fit.__module__ == "mdfconv.fitting.solve"
+    assert all(callable(getattr(mdfconv.fitting, name)) for name in mdfconv.fitting.__all__)
+    assert dir(mdfconv.fitting) == sorted(mdfconv.fitting.__all__)
+
+
+def test_both_forms_of_a_distribution_name_their_options():
+    for form in (mdfconv.Distribution.unit, mdfconv.Distribution.normalized):
+        names = list(inspect.signature(form).parameters)
+        assert names == ["self", "beta", "parameter", "phi", "gamma", "threads"]
+
+
 @pytest.mark.parametrize("name", CALLABLE)
 def test_public_names_are_documented(name):
     documentation = inspect.getdoc(getattr(mdfconv, name))

@@ -73,36 +73,10 @@ def modified(exponent: float, normalizer: str = "usual") -> Brdf:
 
 def _cosine_power(exponent: float) -> Callable[[Array], Array]:
     """Return cos^γ of an angle below π/2, with its digits near 0."""
-    check_exponent(exponent)
-    # cos θ = 1 − 2 sin²(θ/2)
-    return lambda angle: np.exp(exponent * np.log1p(-2 * np.square(np.sin(0.5 * angle))))
-
-
-def check_exponent(exponent: float) -> None:
-    """Raise an MdfconvError unless an exponent is a finite number from 0 up."""
     if not 0 <= exponent < np.inf:
         raise MdfconvError(f"Phong's exponent is at least 0, not {exponent:g}")
-
-
-def normalization(normalizer: str, cosine: Array, exponent: float) -> Array:
-    """Return I_M = ∫ cos^γ θ_r cos θ_i dω_i, exactly or as an approximation.
-
-    Parameters
-    ----------
-    normalizer : str
-        ``"usual"``, ``"arvo"`` or ``"mallett-yuksel"``.
-    cosine : numpy.ndarray
-        Cosine of the viewer with the normal, [0, 1].
-    exponent : float
-        γ ≥ 0; an integer up to 10⁵ for ``"arvo"``.
-
-    Raises
-    ------
-    MdfconvError
-        If the name is not known, or the exponent not one that the normalizer takes.
-    """
-    check_exponent(exponent)
-    return NORMALIZERS[normalizer](np.asarray(cosine, float), float(exponent))
+    # cos θ = 1 − 2 sin²(θ/2)
+    return lambda angle: np.exp(exponent * np.log1p(-2 * np.square(np.sin(0.5 * angle))))
 
 
 def usual(cosine: Array, exponent: float) -> Array:

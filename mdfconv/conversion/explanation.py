@@ -188,6 +188,9 @@ def explained(values: Any, rule: ConversionRule, *, errors: bool) -> list[Conver
     if errors:
         rmse, max_error = np.max([_errors_left(axis, rule) for axis in axes], axis=0)
         cautions[_NO_ERROR] = np.isnan(rmse)
+    methods = [rule.method.name] * parameter.size
+    if rule.exact is None:
+        methods = rule.method.answered_by(rule.task(parameter))
     conversion = partial(
         Conversion,
         source=rule.source.label,
@@ -211,7 +214,7 @@ def explained(values: Any, rule: ConversionRule, *, errors: bool) -> list[Conver
             zip(
                 listed(columns if paired else columns[0]),
                 listed(rule.target.pair(*results) if paired else results[0]),
-                _methods(parameter, rule),
+                methods,
                 strict=True,
             )
         )
@@ -222,16 +225,8 @@ def _errors_left(axis: Converted, rule: ConversionRule) -> tuple[Array, Array]:
     """Return the RMSE and the maximum error of each number of an axis."""
     if rule.exact is not None:
         return np.zeros_like(axis.parameter), np.zeros_like(axis.parameter)
-    source, target = rule.pair
-    lobes = source, axis.parameter, target, axis.result
+    lobes = rule.pair[0], axis.parameter, rule.pair[1], axis.result
     return remaining_error(*lobes, rule.metric, axis.gamma)
-
-
-def _methods(parameter: Array, rule: ConversionRule) -> list[str]:
-    """Return the name of the method that answered for each parameter."""
-    if rule.exact is not None:
-        return [rule.method.name] * parameter.size
-    return rule.method.answered_by(rule.task(parameter))
 
 
 def _route(rule: ConversionRule) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -152,44 +152,36 @@ _SWEEP = {
 }
 
 
-def _cubic(text: str, linear: float, cubic: float) -> ParameterMap:
+def _cubic(text: str, linear: float, cubic: float) -> tuple[Any, ...]:
     """Return linear x − cubic x³, which turns around where it has a maximum."""
     turns_at = float(np.sqrt(linear / (3 * cubic))) if cubic > 0 else float("inf")
-    return ParameterMap(text, lambda x: x * (linear - cubic * x * x), turns_at)
+    return text, lambda x: x * (linear - cubic * x * x), turns_at
 
 
-_FORMULAS = {
-    ("beckmann", "blinn-phong"): ParameterMap(
-        "N = 2/m_B² − 2.5 (eq. 12)", lambda m: 2 / m**2 - 2.5
-    ),
-    ("blinn-phong", "beckmann"): ParameterMap(
-        "m_B = √2/√(N+2.5) (eq. 12)", lambda n: np.sqrt(2) / np.sqrt(n + 2.5)
+# Texts and functions, and where these turn around.
+_PARTS: Mapping[tuple[str, str], tuple[Any, ...]] = {
+    ("beckmann", "blinn-phong"): ("N = 2/m_B² − 2.5 (eq. 12)", lambda m: 2 / m**2 - 2.5),
+    ("blinn-phong", "beckmann"): (
+        "m_B = √2/√(N+2.5) (eq. 12)",
+        lambda n: np.sqrt(2) / np.sqrt(n + 2.5),
     ),
     ("beckmann", "gauss"): _cubic("m_G = 0.5591 m_B³ + m_B (eq. 13)", 1, -0.5591),
     ("gauss", "beckmann"): _cubic("m_B = m_G − 0.4134 m_G³ (eq. 13)", 1, 0.4134),
-    ("gauss", "blinn-phong"): ParameterMap("N = 2/m_G² − 0.5 (eq. 14)", lambda m: 2 / m**2 - 0.5),
-    ("blinn-phong", "gauss"): ParameterMap(
-        "m_G = √2/√(N+0.5) (eq. 14)", lambda n: np.sqrt(2) / np.sqrt(n + 0.5)
+    ("gauss", "blinn-phong"): ("N = 2/m_G² − 0.5 (eq. 14)", lambda m: 2 / m**2 - 0.5),
+    ("blinn-phong", "gauss"): (
+        "m_G = √2/√(N+0.5) (eq. 14)",
+        lambda n: np.sqrt(2) / np.sqrt(n + 0.5),
     ),
-    ("blinn-phong", "sawicki"): ParameterMap(
-        "N_DS = 1.174 N + 0.3 (eq. 15)", lambda n: 1.174 * n + 0.3
-    ),
-    ("sawicki", "blinn-phong"): ParameterMap(
-        "N = (N_DS − 0.3)/1.174 (eq. 15)", lambda n: (n - 0.3) / 1.174
-    ),
+    ("blinn-phong", "sawicki"): ("N_DS = 1.174 N + 0.3 (eq. 15)", lambda n: 1.174 * n + 0.3),
+    ("sawicki", "blinn-phong"): ("N = (N_DS − 0.3)/1.174 (eq. 15)", lambda n: (n - 0.3) / 1.174),
     ("ggx", "gauss"): _cubic("m_G = 0.8222 C + 0.82 C³ (Table 3)", 0.8222, -0.82),
-    ("ggx", "beckmann"): ParameterMap(
-        "m_B = 0.8388 C + 0.7 C⁴ (Table 3)", lambda c: c * (0.8388 + 0.7 * c**3)
-    ),
-    ("ggx", "blinn-phong"): ParameterMap(
-        "N = 1.696²/C² − 4.5 (Table 3)", lambda c: 1.696**2 / c**2 - 4.5
-    ),
+    ("ggx", "beckmann"): ("m_B = 0.8388 C + 0.7 C⁴ (Table 3)", lambda c: c * (0.8388 + 0.7 * c**3)),
+    ("ggx", "blinn-phong"): ("N = 1.696²/C² − 4.5 (Table 3)", lambda c: 1.696**2 / c**2 - 4.5),
     ("gauss", "ggx"): _cubic("C = 1.186 m_G − 0.835 m_G³ (Table 4)", 1.186, 0.835),
     ("beckmann", "ggx"): _cubic("C = 1.2 m_B − 0.56 m_B³ (Table 4)", 1.2, 0.56),
-    ("blinn-phong", "ggx"): ParameterMap(
-        "C = 1.697/√(N+4.5) (Table 4)", lambda n: 1.697 / np.sqrt(n + 4.5)
-    ),
+    ("blinn-phong", "ggx"): ("C = 1.697/√(N+4.5) (Table 4)", lambda n: 1.697 / np.sqrt(n + 4.5)),
 }
+_FORMULAS = {pair: ParameterMap(*parts) for pair, parts in _PARTS.items()}
 
 
 @lru_cache(maxsize=64)

@@ -28,6 +28,7 @@ Pair: TypeAlias = tuple[float, float]
 Value: TypeAlias = float | Pair
 
 _Word: TypeAlias = str | None
+_Columns: TypeAlias = tuple[ArrayLike, ArrayLike]
 # Fewer numbers are all looked at sooner than their extremes are found.
 _FEW = 16
 
@@ -59,11 +60,7 @@ def convert(  # type: ignore[overload-overlap]  # a pair of numbers is an array_
 ) -> Pair: ...
 @overload
 def convert(
-    values: tuple[ArrayLike, ArrayLike],
-    source: Name,
-    target: Name,
-    method: _Word = ...,
-    **options: Unpack[_Fixed],
+    values: _Columns, source: Name, target: Name, method: _Word = ..., **options: Unpack[_Fixed]
 ) -> tuple[Any, Any]: ...
 @overload
 def convert(

@@ -311,12 +311,20 @@ class Distribution(ABC):
     @overload
     def normalized(self, beta: ArrayLike, parameter: Any, **options: Unpack[Options]) -> Array: ...
 
-    def normalized(self, beta: ArrayLike, parameter: Any, **options: Unpack[Options]) -> Any:
+    def normalized(
+        self,
+        beta: ArrayLike,
+        parameter: Any,
+        *,
+        phi: ArrayLike | None = None,
+        gamma: ArrayLike | None = None,
+        threads: int = 1,
+    ) -> Any:
         """Evaluate the normalized form D, for which ∫ D cos β dω = 1.
 
         Parameters, shapes and errors are those of `unit`; the result is in 1/sr.
         """
-        return self._evaluate("_normalized", beta, parameter, **options)
+        return self._evaluate("_normalized", beta, parameter, phi, gamma, threads)
 
     @overload
     def cumulative(self, beta: float, parameter: float, *, complement: bool = ...) -> float: ...
@@ -472,9 +480,7 @@ class Distribution(ABC):
             # F is a function of tan β / p, and dF = 2π D sin β cos β dβ.
             lobe = self._lobe(beta, parameter) * self._at_normal(parameter)
             return share, -0.5 * np.pi * lobe * np.square(np.sin(2 * beta))
-        above, below = (
-            self._cumulative(beta, parameter * np.exp(step))[0] for step in (_STEP, -_STEP)
-        )
+        above, below = (self._cumulative(beta, parameter * np.exp(s))[0] for s in (_STEP, -_STEP))
         return share, (above - below) / (2 * _STEP)
 
     def _off_axis_maximum(self, parameter: Array) -> Array | None:

@@ -25,9 +25,7 @@ _ROUGHNESS = Parameter("roughness", "r", (0.0, 1.0), 0, 1, lower_closed=True, up
 _ABOVE_ZERO = replace(_ROUGHNESS, lower_closed=False)
 _SMOOTHNESS = replace(_ROUGHNESS, name="smoothness", symbol="s", larger_is_smoother=True)
 _SHININESS = replace(_SMOOTHNESS, name="shininess", lower_closed=False)
-_GLOSSINESS = replace(
-    _SMOOTHNESS, name="glossiness", symbol="g", lower_closed=True, upper_closed=False
-)
+_GLOSSINESS = replace(_SMOOTHNESS, name="glossiness", symbol="g", upper_closed=False)
 _ALPHA = replace(_ABOVE_ZERO, name="alpha", symbol="α")
 # The typical range of stored numbers ends so near to where they are clamped.
 _SHORT_OF_CLAMP = 0.9

@@ -66,10 +66,8 @@ class Endpoint:
         stored = np.asarray(self.stored.check(values, self.label), dtype=np.float64)
         with np.errstate(all="ignore"):
             parameter = self.encoding.decode(stored) if self.encoding else stored
-        checked: Array = np.asarray(
-            self.distribution.parameter.check(parameter, self.distribution.name)
-        )
-        return checked
+        mdf = self.distribution
+        return np.asarray(mdf.parameter.check(parameter, mdf.name))
 
     def decode_legal(self, values: Array) -> Array:
         """Return the parameters for stored values (float64); NaN for those that are illegal."""

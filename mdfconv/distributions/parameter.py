@@ -27,10 +27,8 @@ def percent_hint(text: str, separator: str = ",") -> str:
         return ""
     if not any(part.endswith("%") for part in parts) or not np.isfinite(numbers).all():
         return ""
-    shares = [
-        number / 100 if part.endswith("%") else number
-        for part, number in zip(parts, numbers, strict=True)
-    ]
+    percent = [100 if part.endswith("%") else 1 for part in parts]
+    shares = (number / by for number, by in zip(numbers, percent, strict=True))
     return f"did you mean {separator.join(map(number_text, shares))}?"
 
 
@@ -131,11 +129,10 @@ class Parameter:
             return operand
         index = int(np.argmin(self.accepts(array)))
         bad = float(array.flat[index])
+        what = f"{owner} {self.symbol} = {number_text(bad)}"
         which = f" (value {index + 1} of {array.size})" if array.size > 1 else ""
-        what = "not a finite number" if not np.isfinite(bad) else "outside the legal range"
-        raise MdfconvError(
-            f"{owner} {self.symbol} = {number_text(bad)} is {what}{which}: {self.legal}"
-        )
+        wrong = "not a finite number" if not np.isfinite(bad) else "outside the legal range"
+        raise MdfconvError(f"{what} is {wrong}{which}: {self.legal}")
 
     def _check_held(self, low: float, high: float, owner: str, dtype: np.dtype[Any]) -> None:
         smallest, largest = self.held(dtype)

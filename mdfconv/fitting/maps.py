@@ -47,9 +47,7 @@ class Map:
     def __call__(self, x: Array) -> Array:
         """Return x² κ at x, shape (n,); NaN outside the range."""
         value = np.full_like(x, np.nan)
-        for low, high, piece in zip(
-            self.edges[:-1], self.edges[1:], self.coefficients, strict=True
-        ):
+        for (low, high), piece in zip(pairwise(self.edges), self.coefficients, strict=True):
             inside = np.flatnonzero((x > low) & (x <= high))
             if inside.size:
                 z = (x[inside] - 0.5 * (low + high)) * (2 / (high - low))
@@ -125,10 +123,8 @@ class StoredFit:
     def __call__(self, parameter: Array) -> Array:
         """Return the target's parameters (any shape); NaN beyond the range of the map."""
         if self._ratio is not None:
-            last = np.minimum(
-                follow(self._forward, parameter) * self._ratio, self._last.parameter.upper
-            )
-            return follow(self._back, last)
+            last = follow(self._forward, parameter) * self._ratio
+            return follow(self._back, np.minimum(last, self._last.parameter.upper))
         assert self.map is not None, "asked only for what is known"
         source, target = self.variables
         values = parameter.ravel()

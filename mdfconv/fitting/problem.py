@@ -19,31 +19,29 @@ _LEAST, _BISECTIONS, _SECANTS = 1e-20, 22, 4
 
 
 def level_crossing(
-    distribution: Distribution, parameter: Array, level: Array, high: Array, low: Array
+    mdf: Distribution, parameter: Array, level: Array, high: Array, low: Array
 ) -> Array:
     """Return the angle between `high` and `low` at which D̄ falls through a level; 0 for none.
 
     All have the shape (n, 1); at the angle `high` D̄ is above the level, at `low` below it.
     """
-    crosses = (level < 1) & (distribution.shape(low, parameter) < level)
+    crosses = (level < 1) & (mdf.shape(low, parameter) < level)
     high, low = np.maximum(high, _LEAST), np.maximum(low, _LEAST)
     for _ in range(_BISECTIONS):
         middle = np.sqrt(low * high)
-        above = distribution.shape(middle, parameter) >= level
+        above = mdf.shape(middle, parameter) >= level
         high, low = np.where(above, middle, high), np.where(above, low, middle)
-    at_high, at_low = (distribution.shape(angle, parameter) - level for angle in (high, low))
+    at_high, at_low = (mdf.shape(angle, parameter) - level for angle in (high, low))
     for _ in range(_SECANTS):
         with np.errstate(divide="ignore", invalid="ignore"):
             middle = high + (low - high) * at_high / (at_high - at_low)
         # Where D̄ is the level all along, any angle is.
         middle = np.where(np.isfinite(middle), middle, high)
-        value = distribution.shape(middle, parameter) - level
+        value = mdf.shape(middle, parameter) - level
         above = value >= 0
         # The end that stays pulls half as hard, so that both come near (Dowell & Jarratt 1971).
-        at_high, at_low = (
-            np.where(above, value, 0.5 * at_high),
-            np.where(above, 0.5 * at_low, value),
-        )
+        at_high = np.where(above, value, 0.5 * at_high)
+        at_low = np.where(above, 0.5 * at_low, value)
         high, low = np.where(above, middle, high), np.where(above, low, middle)
     return np.where(crosses, middle, 0)
 
@@ -119,24 +117,21 @@ class FitProblem:
         weight = weight * self.metric.weight(beta)
         signal = self.metric.signal(self._source, beta, self._source_parameter, self._peak)
         shape = (*candidates.shape, beta.shape[1])
-        residual = self.metric.signal(
-            self.target,
-            np.broadcast_to(beta[:, None, :], shape),
-            candidates[:, :, None],
-            self._peak[:, :, None],
-        )
+        angles = np.broadcast_to(beta[:, None, :], shape)
+        rest = candidates[:, :, None], self._peak[:, :, None]
+        residual = self.metric.signal(self.target, angles, *rest)
         residual -= signal[:, None, :]
         return np.einsum("ik,ijk,ijk->ij", weight, residual, residual)
 
     def distance(self, log_parameter: Array, index: Indices) -> tuple[Array, Array]:
         """Return the distance and half its slope in ln p, for some problems of the batch."""
-        weight, residual, slope = self._residual_and_slope(log_parameter, index)
+        weight, residual, slope = self._with_slope(log_parameter, index)
         weighted = weight * residual
         return np.einsum("ij,ij->i", weighted, residual), np.einsum("ij,ij->i", weighted, slope)
 
     def step(self, log_parameter: Array) -> tuple[Array, Array]:
         """Return the Gauss-Newton step in ln p from near a minimum, and the distance there."""
-        weight, residual, slope = self._residual_and_slope(log_parameter, self._all)
+        weight, residual, slope = self._with_slope(log_parameter, self._all)
         weighted = weight * slope
         curvature = np.einsum("ij,ij->i", weighted, slope)
         step = -np.einsum("ij,ij->i", weighted, residual) / curvature
@@ -174,9 +169,7 @@ class FitProblem:
             largest = np.max(np.abs(difference), axis=1) / np.max(np.abs(signal), axis=1)
         return share, largest
 
-    def _residual_and_slope(
-        self, log_parameter: Array, index: Indices
-    ) -> tuple[Array, Array, Array]:
+    def _with_slope(self, log_parameter: Array, index: Indices) -> tuple[Array, Array, Array]:
         """Return the weights, ΔS and ∂S/∂ ln p of some problems at their samples."""
         parameter = np.exp(log_parameter)[:, None]
         beta, weight, signal = self._samples_for(parameter, index)

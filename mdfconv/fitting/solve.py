@@ -38,12 +38,11 @@ def errors_of_many(function: Callable[[Array], Array], parameter: Array) -> Arra
     if parameter.size < 2 * _COARSE or not np.ptp(parameter) > 0:
         return function(parameter)
     low, high = parameter.min(), parameter.max()
-    (errors,), _ = interpolated(
-        lambda x: function(np.clip(np.exp(x), low, high))[None],
-        np.log(parameter),
-        _COARSE,
-        _COARSE_TOLERANCE,
-    )
+
+    def knots(x: Array) -> Array:
+        return function(np.clip(np.exp(x), low, high))[None]
+
+    (errors,), _ = interpolated(knots, np.log(parameter), _COARSE, _COARSE_TOLERANCE)
     rest = np.isnan(errors)
     errors[rest] = function(parameter[rest])
     return errors
@@ -403,7 +402,7 @@ class FitCurve:
 
     def __init__(self, knots: ConversionTask) -> None:
         self._task = knots
-        fits = _solved(knots, ((_search, 0),))
+        fits = cold_fit(knots)
         order = np.argsort(knots.parameter)
         x = np.log(knots.parameter[order])
         known = ~np.isnan(fits.parameter[order]) & (np.diff(x, prepend=-np.inf) > 0)
@@ -547,15 +546,8 @@ def fit(
     return _solved(ConversionTask(source, parameter, target, metric, quadrature), searches)
 
 
-def cold_fit(
-    source: Distribution,
-    parameter: Array,
-    target: Distribution,
-    metric: Metric,
-    quadrature: Quadrature | None = None,
-) -> Fit:
+def cold_fit(task: ConversionTask) -> Fit:
     """Fit without knowing where the minimum is: as `fit`, which it checks."""
-    task = ConversionTask(source, parameter, target, metric, quadrature)
     return _solved(task, ((_search, 0),))
 
 

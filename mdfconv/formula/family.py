@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
+from mdfconv.fitting.maps import horner
 
 # The price of ÷, √ and 1/√ against that of +, − and ×, as on graphics processors.
 SLOW = 4
@@ -133,22 +134,14 @@ def power(base: Array, exponent: float) -> Array:
     return base
 
 
-def horner(coefficients: tuple[float, ...], u: Array) -> Array:
-    """Evaluate a polynomial in the type of its argument."""
-    value = np.full_like(u, coefficients[-1])
-    for coefficient in coefficients[-2::-1]:
-        value = value * u + u.dtype.type(coefficient)
-    return value
-
-
 def evaluate(formula: Formula, w: Array) -> Array:
     """Return t for w, in the type of w and by the steps of the code that is emitted."""
     shape = formula.shape
     with np.errstate(all="ignore"):
         u = power(w, shape.variable)
-        value = horner(formula.numerator, u)
+        value = horner(np.array(formula.numerator), u)
         if shape.factor:
             value = power(w, shape.factor) * value
         if formula.denominator:
-            value = value / horner((1.0, *formula.denominator), u)
+            value = value / horner(np.array([1.0, *formula.denominator]), u)
         return power(value, shape.outer)

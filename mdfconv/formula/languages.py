@@ -93,7 +93,9 @@ class Syntax:
 
     def _statements(self, formula: Formula, problem: SearchProblem) -> list[str]:
         constants, result = _body(formula, problem, self)
-        declared = [self.declare.format(name=name, value=value) for name, value in constants]
+        declared = [
+            self.declare.format(name=name, value=value) for name, value in constants.items()
+        ]
         return [*declared, f"return {result}"]
 
 
@@ -240,16 +242,14 @@ def _end_text(end: Endpoint) -> str:
     return f"{end.label} {end.stored.symbol}{gamma}"
 
 
-def _body(
-    formula: Formula, problem: SearchProblem, dialect: Syntax
-) -> tuple[list[tuple[str, str]], str]:
+def _body(formula: Formula, problem: SearchProblem, dialect: Syntax) -> tuple[dict[str, str], str]:
     """Return the constants of the function and the expression of its result."""
     shape = formula.shape
-    constants: list[tuple[str, str]] = []
+    constants: dict[str, str] = {}
     one = dialect.number(1.0)
 
     def named(name: str, value: str) -> str:
-        constants.append((name, value))
+        constants[name] = value
         return name
 
     w = argument_name(problem.source.stored.name)

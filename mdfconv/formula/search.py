@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
@@ -12,8 +11,9 @@ import numpy as np
 from mdfconv.distributions.endpoint import Endpoint
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
+from mdfconv.fitting.maps import horner
 from mdfconv.fitting.metrics import Metric
-from mdfconv.formula.family import Formula, Shape, evaluate, horner, power, shapes
+from mdfconv.formula.family import Formula, Shape, evaluate, power, shapes
 
 # Fits over the range, and the degree of the spline between them: on the usual ranges within the
 # rounding of float32 of the fit, and within 2e-5 at a kink, as where a maximum leaves the normal.
@@ -182,22 +182,14 @@ def pareto_front(problem: SearchProblem) -> list[Formula]:
     front: list[Formula] = []
     for _, of_one_price in groupby(shapes(), key=lambda shape: shape.operations):
         bound = _GAIN * front[-1].error if front else np.inf
-        best = _most_accurate(problem, of_one_price, bound)
+        best: Formula | None = None
+        for shape in of_one_price:
+            formula = _best(problem, shape, bound)
+            if formula is not None and formula.error < bound:
+                best, bound = formula, formula.error
         if best is not None:
             front.append(best)
     return front
-
-
-def _most_accurate(
-    problem: SearchProblem, candidates: Iterable[Shape], bound: float
-) -> Formula | None:
-    """Return the formula with the smallest error below a bound, if there is one."""
-    best: Formula | None = None
-    for shape in candidates:
-        formula = _best(problem, shape, bound)
-        if formula is not None and formula.error < bound:
-            best, bound = formula, formula.error
-    return best
 
 
 def _best(problem: SearchProblem, shape: Shape, bound: float) -> Formula | None:
@@ -249,7 +241,7 @@ def _minimax(u: Array, needed: Array, shape: Shape, bound: float) -> Array | Non
         if not np.isfinite(root).all():
             break
         coefficients = np.linalg.lstsq(columns * root[:, None], root, rcond=None)[0]
-        down = horner((1.0, *coefficients[shape.numerator :].tolist()), u)
+        down = horner(np.append(1.0, coefficients[shape.numerator :]), u)
         error = np.abs((columns @ coefficients - 1) / down)
         if not ((down > 0).all() and np.isfinite(error).all()):
             break

@@ -242,12 +242,8 @@ class LobeSpectrum:
 
     def with_slope(self, distribution: Distribution, parameter: Array) -> tuple[Array, Array]:
         """Return k_l and ∂k_l/∂ ln p for parameters of shape (n, 1), shapes (n, k)."""
-        pairs = [
-            distribution.with_slope(
-                np.broadcast_to(beta, (len(parameter), beta.size)), parameter, normalized=True
-            )
-            for beta in self._angles
-        ]
+        angles = [np.broadcast_to(beta, (len(parameter), beta.size)) for beta in self._angles]
+        pairs = [distribution.with_slope(beta, parameter, normalized=True) for beta in angles]
         values, slopes = zip(*pairs, strict=True)
         return self._transformed(*values), self._transformed(*slopes)
 

@@ -34,9 +34,7 @@ _LOWEST = 1e-3
 # Linear light around the sphere, so that the silhouette shows.
 BACKGROUND = 0.05
 # What is displayed darker and brighter (Okabe and Ito 2008), and the same.
-_DARKER, _BRIGHTER, _SAME = (
-    np.array(color) for color in ((0, 114, 178), (213, 94, 0), (255, 255, 255))
-)
+_DARKER, _BRIGHTER, _SAME = np.array([(0, 114, 178), (213, 94, 0), (255, 255, 255)])
 _FRAME_COLOR, _ENLARGED_COLOR = "0.75", "#e69f00"
 # A difference of less than this is none on a screen.
 _LEAST_SCALE = 1 / 255
@@ -96,9 +94,8 @@ class _PictureTable:
 
     def __init__(self, axes: Any, rows: int, columns: int, side: float) -> None:
         self.axes, self._caption, self._rule = axes, _CAPTION / side, _RULE / side
-        axes.set(
-            xlim=(-self._rule, columns * (1 + _GAP) - _GAP), ylim=(-rows * (1 + self._caption), 0)
-        )
+        axes.set_xlim(-self._rule, columns * (1 + _GAP) - _GAP)
+        axes.set_ylim(-rows * (1 + self._caption), 0)
         axes.axis("off")
 
     def show(self, row: int, column: int, picture: NDArray[Any], caption: str = "") -> Bounds:
@@ -134,10 +131,7 @@ def _draw_differences(table: _PictureTable, comparison: PictureComparison) -> fl
 
     The place beneath the reference shows the sphere of which the pictures are a part.
     """
-    differences = [
-        [comparison.difference(rendering) for rendering in renderings]
-        for renderings in comparison.rows.values()
-    ]
+    differences = [[*map(comparison.difference, row)] for row in comparison.rows.values()]
     scale = _round_up(max(np.abs(one).max() for row in differences for one in row))
     light = comparison.scene.exposure * comparison.reference.image
     sphere = displayed_pixels(light + _background(Frame(comparison.scene.size)))
@@ -184,9 +178,8 @@ def _draw_bar(axes: Any, scale: float, reference: Rendering) -> None:
     label = "what is displayed, minus that of the source (0 is black, 1 white)"
     if reference.image.ndim == 3:
         label += ", in the channel that differs most"
-    axes.imshow(
-        _diverging(np.linspace(-1, 1, 513)[None, :]), extent=(-scale, scale, 0, 1), aspect="auto"
-    )
+    colors = _diverging(np.linspace(-1, 1, 513)[None, :])
+    axes.imshow(colors, extent=(-scale, scale, 0, 1), aspect="auto")
     axes.set(yticks=[], xticks=np.linspace(-scale, scale, 5))
     axes.grid(visible=False)
     axes.tick_params(labelsize=_FONT)

@@ -141,10 +141,7 @@ def _packed(values: Any, kind: DTypeLike) -> str:
 
 def _rounded(values: Array, digits: int = 8) -> list[Any]:
     """Return an array as lists of numbers with few digits, for they are read as text."""
-    return [
-        _rounded(value, digits) if np.ndim(value) else float(f"{value:.{digits}g}")
-        for value in values
-    ]
+    return [_rounded(v, digits) if np.ndim(v) else float(f"{v:.{digits}g}") for v in values]
 
 
 def _grid(low: float, high: float, count: int) -> Array:
@@ -265,12 +262,12 @@ def _encodings(mdf: Distribution, low: float, high: float) -> dict[str, Any]:
     beside = [limit * (1 + side) for limit in limits for side in (-_BESIDE_CLAMP, 0, _BESIDE_CLAMP)]
     inside = [value for value in beside if low < value < high]
     nodes = np.log(np.unique(np.concatenate([_grid(low, high, _NODES), inside])))
+
+    def stored(logs: Array) -> Array:
+        return np.array([end.encode(np.exp(logs)) for end in encoded])
+
     if encoded:
-        nodes, _, _ = _refined(
-            lambda logs: np.array([end.encode(np.exp(logs)) for end in encoded]),
-            nodes,
-            *_STORED_ERROR,
-        )
+        nodes, _, _ = _refined(stored, nodes, *_STORED_ERROR)
     return {
         "nodes": _packed(nodes, np.float64),
         "forms": [
@@ -301,10 +298,8 @@ def _light(name: str, light: Lights, source: Distribution) -> dict[str, Any]:
         for normal, toward, irradiance in zip(half, light.directions, light.irradiance, strict=True)
     ]
     through = np.array(weights) / float(source.normalized(0.0, typical))
-    peaks = [
-        _peak(source, float(parameter), light, half)
-        for parameter in _grid(*source.parameter.typical, _PEAKS)
-    ]
+    grid = _grid(*source.parameter.typical, _PEAKS).tolist()
+    peaks = [_peak(source, parameter, light, half) for parameter in grid]
     return {
         "label": _LIGHT_LABELS.get(name, name),
         "directions": _rounded(np.column_stack([light.directions, through])),

@@ -1,7 +1,8 @@
 """Scene files: libraries and files of materials, and textures of their roughness."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mdfconv import lazy_face
 
 if TYPE_CHECKING:
     from mdfconv.scene.gltf.asset import GltfConversion, GltfMaterial, convert_gltf
@@ -43,17 +44,9 @@ _MODULES = {
     "texture.rule": ("TextureRule",),
     "texture.texel_map": ("TextureReport",),
 }
-_HOMES = {name: module for module, names in _MODULES.items() for name in names}
-
-
-def __getattr__(name: str) -> Any:
-    """Import what was asked for by its name."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    return value
+__getattr__ = lazy_face(__name__, _MODULES)
 
 
 def __dir__() -> list[str]:
     """Return the public names, whether they are imported yet or not."""
-    return sorted({*globals(), *_HOMES})
+    return sorted(__all__)

@@ -13,6 +13,7 @@ import mdfconv
 from mdfconv.fitting import maps
 from mdfconv.fitting.metrics import list_metrics, metric_named
 from mdfconv.fitting.metrics.base import Display
+from mdfconv.fitting.problem import ConversionTask
 from mdfconv.fitting.solve import cold_fit
 from tests import generate_fast
 from tests.cli.runner import run
@@ -34,7 +35,7 @@ def test_fast_is_the_fit(source, target, kept):
         warnings.simplefilter("ignore", mdfconv.MdfconvWarning)
         got = mdfconv.convert(values, source, target, "fast", metric=kept)
     sides = mdfconv.distribution(source), mdfconv.distribution(target)
-    exact = cold_fit(sides[0], values, sides[1], metric_named(kept)).parameter
+    exact = cold_fit(ConversionTask(sides[0], values, sides[1], metric_named(kept))).parameter
     answered = np.isfinite(got)
     assert got[answered] == pytest.approx(exact[answered], rel=LIMIT[kept])
     # What is left out are sources rougher than any Sawicki lobe that anyone would use.
@@ -161,6 +162,6 @@ def test_many_values_at_another_exposure(source, target, exposure):
     got = mdfconv.convert(many, source, target, "fast", metric=kept)
     few = many[:50]
     ends = mdfconv.distribution(source), mdfconv.distribution(target)
-    exact = cold_fit(ends[0], few, ends[1], kept).parameter
+    exact = cold_fit(ConversionTask(ends[0], few, ends[1], kept)).parameter
     assert got[:50] == pytest.approx(exact, rel=1e-4)
     assert mdfconv.convert(few, source, target, "fast", metric=kept) == pytest.approx(exact, 1e-5)

@@ -11,6 +11,7 @@ from mdfconv.distributions import one_parameter_distributions
 from mdfconv.fitting import maps
 from mdfconv.fitting.metrics import list_metrics, metric_named
 from mdfconv.fitting.metrics.base import Display, Energy, Unit
+from mdfconv.fitting.problem import ConversionTask
 from mdfconv.fitting.quadrature import UniformSamples
 from mdfconv.fitting.solve import cold_fit, fit
 from tests import oracles
@@ -81,7 +82,7 @@ def test_a_warm_start_finds_what_a_cold_one_finds(source, target, kept):
     ends = [mdfconv.distribution(name) for name in (source, target)]
     values = ends[0].from_half_tangent(np.append(np.geomspace(1e-6, 0.3, 4), [0.7, 1.2]))
     problem = ends[0], values[~np.isnan(values)], ends[1], metric_named(kept)
-    warm, cold = fit(*problem), cold_fit(*problem)
+    warm, cold = fit(*problem), cold_fit(ConversionTask(*problem))
     tolerance = 1e-6 if kept.startswith("display") else 3e-7
     np.testing.assert_array_equal(warm.at_limit, cold.at_limit)
     # Where both are clipped as a whole, any lobe will do.
@@ -109,14 +110,14 @@ def test_many_values_are_what_each_is_alone(source, target, kept):
     values = np.random.default_rng(3).permutation(np.geomspace(1e-3, 0.999, 150))
     values = np.append(values, [values[0], 0.9999])
     problem = mdfconv.distribution(source), values, target, metric_named(kept)
-    many, cold = fit(*problem).parameter, cold_fit(*problem).parameter
+    many, cold = fit(*problem).parameter, cold_fit(ConversionTask(*problem)).parameter
     assert many == pytest.approx(cold, rel=1e-6, nan_ok=True)
 
 
 def test_a_start_that_is_far_off_is_not_believed(monkeypatch):
     ends = mdfconv.distribution("beckmann"), mdfconv.distribution("ggx")
     values = np.array([0.05, 0.3])
-    wanted = cold_fit(ends[0], values, ends[1], Energy()).parameter
+    wanted = cold_fit(ConversionTask(ends[0], values, ends[1], Energy())).parameter
     astray = maps.StoredFit.__call__
     monkeypatch.setattr(maps.StoredFit, "__call__", lambda self, p: 1.3 * astray(self, p))
     np.testing.assert_allclose(fit(ends[0], values, ends[1], Energy()).parameter, wanted, rtol=1e-9)

@@ -8,6 +8,7 @@ import mdfconv
 from mdfconv.fitting.free_gamma import fit_free_gamma, least_squares
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.fitting.metrics.base import Energy, Unit
+from mdfconv.fitting.problem import ConversionTask
 
 GTR = mdfconv.distribution("gtr")
 TARGETS = ("gtr", "student-t")
@@ -46,9 +47,8 @@ def test_no_pair_nearby_or_far_is_better(metric, target):
     for row, value in enumerate(values):
         near = found.gamma[row] * np.array([0.98, 0.999, 1, 1.001, 1.02])
         for gamma in np.clip(np.append(near, np.geomspace(low, high, 9)), low, high):
-            best = mdfconv.fitting.solve.cold_fit(
-                source, np.array([value]), entry.with_gamma(gamma), metric
-            )
+            task = ConversionTask(source, np.array([value]), entry.with_gamma(gamma), metric)
+            best = mdfconv.fitting.solve.cold_fit(task)
             if not np.isnan(best.distance[0]):
                 assert best.distance[0] >= found.distance[row] * (1 - 1e-5)
 

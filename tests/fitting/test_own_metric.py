@@ -10,6 +10,7 @@ import mdfconv
 from mdfconv.fitting import metrics
 from mdfconv.fitting.metrics import metric_named, register_metric
 from mdfconv.fitting.metrics.base import Display, Energy, Environment, Unit
+from mdfconv.fitting.problem import ConversionTask
 from mdfconv.fitting.solve import cold_fit, fit
 from tests.fitting import brute_force
 from tests.fitting.test_fit import NAMES, candidates
@@ -71,7 +72,8 @@ def test_many_values_are_fitted_at_the_minimum(metric):
     ends = mdfconv.distribution("beckmann"), mdfconv.distribution("schlick")
     values = np.geomspace(0.01, 0.5, 70)
     many = fit(ends[0], values, ends[1], metric).parameter
-    assert many == pytest.approx(cold_fit(ends[0], values, ends[1], metric).parameter, rel=1e-8)
+    cold = cold_fit(ConversionTask(ends[0], values, ends[1], metric)).parameter
+    assert many == pytest.approx(cold, rel=1e-8)
 
 
 def test_only_roots_are_steep(metric):

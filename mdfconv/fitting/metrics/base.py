@@ -116,13 +116,11 @@ class Metric(ABC):
         """Return dS/d(D/P)."""
         return 1.0
 
-    def signal(
-        self, distribution: Distribution, beta: Array, parameter: Array, peak: Array
-    ) -> Array:
+    def signal(self, mdf: Distribution, beta: Array, parameter: Array, peak: Array) -> Array:
         """Return S of a distribution for P = `peak`; `beta` has the shape of the result."""
         with np.errstate(all="ignore"):
-            value = distribution.shape(beta, parameter)
-            value *= distribution.maximum(parameter, normalized=self.normalized) / peak
+            value = mdf.shape(beta, parameter)
+            value *= mdf.maximum(parameter, normalized=self.normalized) / peak
         return self.encode(value)
 
     def signal_and_slope(
@@ -272,12 +270,10 @@ class Environment(Metric):
         # A panel of no width lies at 0.
         return 4 / np.maximum(np.sin(2 * beta), 1e-300)
 
-    def signal(
-        self, distribution: Distribution, beta: Array, parameter: Array, peak: Array
-    ) -> Array:
+    def signal(self, mdf: Distribution, beta: Array, parameter: Array, peak: Array) -> Array:
         """Return F − sin²β."""
         with np.errstate(all="ignore"):
-            return self.signal_and_slope(distribution, beta, parameter, peak)[0]
+            return self.signal_and_slope(mdf, beta, parameter, peak)[0]
 
     def signal_and_slope(
         self, distribution: Distribution, beta: Array, parameter: Array, peak: Array

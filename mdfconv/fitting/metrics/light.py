@@ -67,13 +67,11 @@ class LightMetric(Metric):
         """Return the degrees."""
         return _Degrees(self._lobes.degree)
 
-    def signal(
-        self, distribution: Distribution, beta: Array, parameter: Array, peak: Array
-    ) -> Array:
+    def signal(self, mdf: Distribution, beta: Array, parameter: Array, peak: Array) -> Array:
         """Return k_l."""
         with np.errstate(all="ignore"):
             # A row at a time stays in the cache.
-            rows = [self._lobes(distribution, row[..., None]) for row in parameter[..., 0]]
+            rows = [self._lobes(mdf, row[..., None]) for row in parameter[..., 0]]
         return np.stack(rows)
 
     def signal_and_slope(

@@ -2,6 +2,6 @@
 
 from mdfconv.brdf.fresnel import conductor, dielectric
 from mdfconv.brdf.microfacet import MASKINGS, Microsurface
-from mdfconv.brdf.reflection import BRDFS
+from mdfconv.brdf.reflection import BRDFS, NORMALIZERS
 
-__all__ = ["BRDFS", "MASKINGS", "Microsurface", "conductor", "dielectric"]
+__all__ = ["BRDFS", "MASKINGS", "NORMALIZERS", "Microsurface", "conductor", "dielectric"]

@@ -150,13 +150,16 @@ def holds_pairs(values: Any) -> bool:
     if not isinstance(values, list):
         return False
     kinds = set(map(type, values))
-    pairs = any(issubclass(kind, tuple) for kind in kinds)
-    return pairs or (list in kinds and any(map(holds_pairs, values)))
+    return any(map(_is_pair, kinds)) or (list in kinds and any(map(holds_pairs, values)))
+
+
+def _is_pair(kind: type) -> bool:
+    return issubclass(kind, tuple)
 
 
 def in_order(values: list[Any], convert_part: Callable[[Any], list[Any]]) -> list[Any]:
     """Convert the pairs of a list and its numbers, each at once; return all in their order."""
-    paired = [isinstance(value, tuple) for value in values]
+    paired = list(map(_is_pair, map(type, values)))
     pairs = list(compress(values, paired))
     numbers = list(compress(values, map(not_, paired)))
     for pair in pairs:
@@ -280,8 +283,7 @@ class ConversionRule:
         cautions |= {f"{self.target.label} clamps: {text}": clamped[text] for text in clamped}
         if self._same_lobes is None:
             with np.errstate(all="ignore"):
-                task = self.task(converted.parameter)
-                cautions |= self.method.cautions(task, converted.result)
+                cautions |= self.method.cautions(self.task(converted.parameter), converted.result)
         if converted.gamma_at_limit is not None:
             low, high = self.pair[1].parameters[1].fit_range
             sentence = (

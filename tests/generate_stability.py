@@ -308,6 +308,7 @@ def peak(source, target, value, gamma):
     at_normal = oracles.at_normal(source, value, gamma)
     square = 1 / (mp.pi * at_normal)
     results = {
+        **dict.fromkeys(("beckmann", "ggx", "schlick", "student-t"), lambda: mp.sqrt(square)),
         "blinn-phong": lambda: 2 / square - 2,
         "sawicki": lambda: 8 / (3 * square) - 3,
         "smoothie": lambda: mp.sqrt(4 * square / (1 - square)) if square < 1 else mp.mpf(0),
@@ -317,7 +318,9 @@ def peak(source, target, value, gamma):
     # Every distribution is at least as high as one that is 1/π everywhere.
     if target in ("gauss", "gtr") and square >= 1:
         return None
-    return legal(target, results.get(target, lambda: mp.sqrt(square))())
+    if target not in results:
+        raise oracles.missing(target, "peak", "tests/generate_stability.py")
+    return legal(target, results[target]())
 
 
 def same_peak(target, at_normal, gamma):

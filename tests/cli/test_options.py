@@ -112,7 +112,9 @@ def test_every_command_that_writes_is_asked():
     lines = [*WRITING[:-2], *(parameter.values[0] for parameter in WRITING[-2:])]
     kinds = {"--output", "--png", "--csv", "--json", "--html", "--report"}
     writing = {command for name in kinds for command, _ in options()[name]}
-    assert {line.split()[0] for line in lines} == writing
+    assert {line.split()[0] for line in lines} == writing, (
+        "each command that writes files has a line in WRITING of this file"
+    )
 
 
 @pytest.mark.parametrize("line", WRITING)

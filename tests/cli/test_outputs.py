@@ -172,7 +172,9 @@ def file_options(name):
 @pytest.mark.parametrize("name", GROUP.list_commands(None))
 def test_every_option_for_a_file_is_known_here(name):
     naming, every = file_options(name)
-    assert naming == set(CASES[name].outputs if name in CASES else ())
+    assert naming == set(CASES[name].outputs if name in CASES else ()), (
+        "each command that writes files has a case in CASES of this file"
+    )
     assert ("--force" in every) == bool(naming)
 
 

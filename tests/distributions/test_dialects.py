@@ -101,7 +101,9 @@ IDS = [f"{owner}:{dialect.name}" for owner, dialect in CASES]
 
 
 def test_every_dialect_has_a_rule_of_its_source():
-    assert {dialect.name for dialect in DIALECTS} == set(STORED) | set(READ)
+    assert {dialect.name for dialect in DIALECTS} == set(STORED) | set(READ), (
+        "each dialect has its rule in STORED (from the exponent) or READ (to α) of this file"
+    )
     assert not set(STORED) & set(READ)
     for dialect in DIALECTS:
         assert dialect.program

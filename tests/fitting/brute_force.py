@@ -145,6 +145,13 @@ class Problem:
         )
         return (targets - source) ** 2 @ self.weight(grid)
 
+    def distance(self, parameter):
+        """Return the distance from the source to one target, on a fine grid with their corners."""
+        lobes = Lobe(self.target, parameter), self.source
+        grid = self.grid(lobes)
+        target, source = (self.signal(lobe.form(grid), lobe.highest(grid), grid) for lobe in lobes)
+        return np.sum(self.weight(grid) * (target - source) ** 2)
+
     def imbalance(self, log_parameter):
         """Return the distance at p(1+h) less that at p(1−h), without cancellation."""
         above, below = (Lobe(self.target, np.exp(log_parameter + step)) for step in (STEP, -STEP))
@@ -192,7 +199,10 @@ class Problem:
 def minimum(metric, source, parameter, target, width, candidates):
     """Return the global minimum among candidates, refined; NaN if it is the lowest candidate."""
     problem = Problem(metric, source, parameter, target, width)
-    lowest = int(np.argmin(problem.distances(candidates)))
+    # The edge of a lobe is steep under a root, and moves with the candidate: each has its own grid.
+    steep = metric in ENCODINGS and ENCODINGS[metric](np.array(1e-12)) > 1e-6
+    scanned = list(map(problem.distance, candidates)) if steep else problem.distances(candidates)
+    lowest = int(np.argmin(scanned))
     if lowest == 0:
         return np.nan
     assert lowest < len(candidates) - 1, "the scan must hold the minimum inside"

@@ -4,7 +4,6 @@ import copy
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 import mdfconv
 from mdfconv.fitting import metrics
@@ -36,24 +35,11 @@ def metric(monkeypatch):
 
 
 def minimum(source, value, target):
-    """Return the fit by a dense rule and a search that share no code with the fit's.
-
-    Unlike `brute_force.minimum` it scans on a grid for each candidate: a steep edge moves with it.
-    """
-    first, last = mdfconv.distribution(source), mdfconv.distribution(target)
-    width = first.half_width(value)
-    problem = brute_force.Problem("cube-root", source, value, target, width)
-
-    def distance(parameter):
-        lobes = brute_force.Lobe(target, parameter), problem.source
-        grid = problem.grid(lobes)
-        signals = [problem.signal(lobe.form(grid), None, grid) for lobe in lobes]
-        return np.sum(problem.weight(grid) * (signals[0] - signals[1]) ** 2)
-
-    scanned = candidates(target, last.from_half_tangent(np.tan(width)))
-    lowest = int(np.argmin([distance(parameter) for parameter in scanned]))
-    ends = np.log([scanned[lowest - 1], scanned[lowest + 1]])
-    return np.exp(brentq(problem.imbalance, *ends, xtol=2e-9, rtol=1e-13))
+    """Return the fit by a dense rule and a search that share no code with the fit's."""
+    width = mdfconv.distribution(source).half_width(value)
+    half_tangent = np.tan(width)
+    scanned = candidates(target, mdfconv.distribution(target).from_half_tangent(half_tangent))
+    return brute_force.minimum("cube-root", source, value, target, width, scanned)
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,8 @@ _NATURAL = "environment"
 # Of the table of encodings what a narrow terminal leaves out first.
 _SECONDARY = ("N 100", "programs", "N 10", "N 1000")
 _FOOTNOTE = (
-    "L is the weight of the specular lobe, which --specular gives, too. A mirror is what a rule "
-    "makes of a surface that is none."
+    "L is the weight of the specular lobe, which --specular gives, too, K a scale, as in "
+    "blinn-phong:linear:128. A mirror is what a rule makes of a surface that is none."
 )
 
 _ENCODINGS = flag("--encodings", "List what follows a colon: how files and programs store it.")
@@ -68,7 +68,8 @@ def _list_encodings(metric: Metric, format_: options.Format | None) -> None:
         return
     rows = [
         {
-            "encoding": record["encoding"] + "[:L]" * (record["specular"] != "no"),
+            "encoding": record["encoding"]
+            + (f"[:{record['setting']}]" if record["setting"] else ""),
             "rule": "; ".join(filter(None, (record["formula"], record["clamped"]))),
             **{f"N {n}": _error(record[f"rmse_{n}"]) for n in EXPONENTS},
             "programs": record["programs"],

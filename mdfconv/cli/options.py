@@ -99,6 +99,15 @@ FolderOption = Annotated[Path | None, _FOLDER]
 ForceOption = Annotated[
     bool, flag("--force", "Write over files that exist; else they are refused.")
 ]
+DryRunOption = Annotated[bool, flag("--dry-run", "Report what would be converted; write nothing.")]
+_TEXELS = option(
+    "MDF:ENCODING",
+    "What the texels of roughness textures are, such as ggx:roughness, ggx:glossiness or "
+    "blinn-phong:exponent; by default what the program is known to write.",
+    "--texels",
+    words=completion.texels,
+)
+TexelsOption = Annotated[str | None, _TEXELS]
 PngOption = Annotated[Path | None, option("FILE", "Draw the result into a picture.")]
 DpiOption = Annotated[
     int, option("N", "Resolution of pictures, dots an inch.", min=10, max=_LARGEST_DPI)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -50,6 +50,7 @@ class Beckmann(base.AlphaDistribution, base.AnisotropicDistribution):
 
     name = "beckmann"
     aliases = ("cook-torrance",)
+    meant_by: ClassVar = {"radiance": "beckmann:ward"}
     unit_formula = "exp(−tan²β/m²) / cos⁴β, divided by its maximum where m > 1/√2"
     normalized_formula = "exp(−tan²β/m²) / (π m² cos⁴β)"
     source = "Beckmann & Spizzichino 1963; Cook & Torrance 1981"

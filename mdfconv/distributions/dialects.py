@@ -10,16 +10,24 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
 from mdfconv.distributions.base import same
 from mdfconv.distributions.evaluation import Array
-from mdfconv.distributions.parameter import Clamp, Encoding, Pairing, Parameter, percent_hint
+from mdfconv.distributions.parameter import (
+    REFLECTED,
+    Clamp,
+    Encoding,
+    Pairing,
+    Parameter,
+    percent_hint,
+)
 from mdfconv.errors import MdfconvError
 
-# From stored number or parameter, and the specular weight, to the other.
-_Rule = Callable[[Array, float], Array]
+# From stored number or parameter, and the setting of the rule, to the other.
+_Rule = Callable[[Array, Any], Array]
 
 _ROUGHNESS = Parameter("roughness", "r", (0.0, 1.0), 0, 1, lower_closed=True, upper_closed=True)
 _ABOVE_ZERO = replace(_ROUGHNESS, lower_closed=False)
@@ -29,6 +37,8 @@ _GLOSSINESS = replace(_SMOOTHNESS, name="glossiness", symbol="g", upper_closed=F
 _ALPHA = replace(_ABOVE_ZERO, name="alpha", symbol="α")
 # The typical range of stored numbers ends so near to where they are clamped.
 _SHORT_OF_CLAMP = 0.9
+# Of textures that hold what the rule says of numbers.
+SAME = "same"
 
 
 class Specular(StrEnum):
@@ -37,6 +47,62 @@ class Specular(StrEnum):
     no = "no"
     optional = "optional"
     needed = "needed"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A number besides the stored one that a rule depends on; it follows the name and a colon.
+
+    Parameters
+    ----------
+    name : str
+        What it is, in words.
+    symbol : str
+        Its symbol in the rule.
+    default : float or None
+        What is taken where it is not given; None if it must be given.
+    example : float
+        A usual value, for lists of rules.
+    largest : float
+        The largest that is legal; all are above 0.
+    argument : str
+        The argument of functions that has it.
+    """
+
+    name: str
+    symbol: str
+    default: float | None
+    example: float
+    largest: float = float("inf")
+    argument: str = ""
+
+
+_WEIGHT = Setting("specular weight", "L", None, 1.0, 1.0, "specular")
+_OPTIONAL_WEIGHT = replace(_WEIGHT, default=1.0)
+_SCALE = Setting("scale", "K", None, 128.0)
+
+
+@dataclass(frozen=True)
+class LibraryNumbers:
+    """What Ns is in the Wavefront material libraries that a program writes.
+
+    Parameters
+    ----------
+    rule : str
+        The rule from what the author set to Ns.
+    header : str
+        A regular expression for a comment of the library, with the groups ``name`` (of the
+        program) and, where the program writes it, ``version``.
+    step : float
+        What authors set is a multiple of it as a rule: of a hardness always.
+    before : tuple of int
+        The first version that writes it no longer; empty if all do.
+    """
+
+    rule: str
+    header: str
+    step: float
+    before: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -60,8 +126,8 @@ class Dialect:
         Name, symbol and legal range of the stored number.
     clamps : tuple of Clamp
         Where the program clamps.
-    specular : Specular
-        Whether the rule depends on the specular weight, which is 1 if not given.
+    setting : Setting or None
+        What else the rule depends on.
     roughness : callable or None
         From the stored number to the roughness (α = r²) as which GGX renders it; None where the
         program renders the distribution itself, so that the rule makes no error.
@@ -73,6 +139,13 @@ class Dialect:
         What ``asset.generator`` has, in lower case, in a glTF file with numbers of this rule.
     provided : str
         On what condition it has; "" for none.
+    texels : str
+        What the program's *textures* hold: `SAME` for what the rule says of numbers, an endpoint
+        such as ``"ggx:roughness"``, or "" where it is not known.
+    library : LibraryNumbers or None
+        How its numbers get into material libraries; None if they do not.
+    caution : str
+        What everybody who uses it must know; "" for nothing.
     """
 
     name: str
@@ -84,12 +157,28 @@ class Dialect:
     source: str
     stored: Parameter = _ROUGHNESS
     clamps: tuple[Clamp, ...] = ()
-    specular: Specular = Specular.no
+    setting: Setting | None = None
     roughness: Callable[[Array], Array] | None = field(default=None, compare=False)
     note: str = ""
     pairing: Pairing | None = None
     generators: tuple[str, ...] = ()
     provided: str = ""
+    texels: str = ""
+    library: LibraryNumbers | None = None
+    caution: str = ""
+
+    @property
+    def specular(self) -> Specular:
+        """Whether the rule depends on the specular weight."""
+        if self.setting is None or self.setting.symbol != _WEIGHT.symbol:
+            return Specular.no
+        return Specular.needed if self.setting.default is None else Specular.optional
+
+    @property
+    def example(self) -> str:
+        """The name with a usual value of the setting that it needs."""
+        needed = self.setting is not None and self.setting.default is None
+        return f"{self.name}:{self.setting.example:g}" if self.setting and needed else self.name
 
     def encoding(self, parameter: Parameter, setting: str = "") -> Encoding:
         """Return it as an encoding of a parameter.
@@ -99,14 +188,14 @@ class Dialect:
         parameter : Parameter
             That of the distribution.
         setting : str
-            The specular weight, from above 0 to 1; "" if not given.
+            The setting, as text; "" if not given.
 
         Raises
         ------
         MdfconvError
-            If the weight is missing, none of the rule's, or illegal.
+            If the setting is missing, illegal, or the rule has none.
         """
-        weight = self._weight(setting)
+        weight = self.setting_value(setting)
 
         with np.errstate(all="ignore"):
             clamps = tuple(
@@ -126,7 +215,7 @@ class Dialect:
         )
         return Encoding(
             f"{self.name}:{setting}" if setting else self.name,
-            replace(self.stored, typical=(ends[0], min(ends[1], 1.0))),
+            replace(self.stored, typical=(ends[0], min(ends[1], self.stored.upper))),
             lambda stored: self.decode(stored, weight),
             lambda value: self.encode(value, weight),
             self.formula,
@@ -134,25 +223,33 @@ class Dialect:
             self.pairing,
         )
 
-    def _weight(self, setting: str) -> float:
-        if not setting:
-            if self.specular is Specular.needed:
+    def setting_value(self, text: str = "") -> float:
+        """Return the setting that a text gives, or its default; 1 where the rule has none."""
+        setting = self.setting
+        if setting is None:
+            if text:
                 raise MdfconvError(
-                    f"{self.name} stores what depends on the specular weight",
-                    f"give it, as in {self.owners[0]}:{self.name}:0.5",
-                    argument="specular",
+                    f"{self.name} does not depend on a specular weight or another setting",
+                    f"leave out :{text}",
                 )
             return 1.0
-        if self.specular is Specular.no:
-            raise MdfconvError(f"{self.name} does not depend on a specular weight")
+        if not text:
+            if setting.default is None:
+                raise MdfconvError(
+                    f"{self.name} depends on the {setting.name} {setting.symbol}",
+                    f"give it, as in {self.owners[0]}:{self.name}:{setting.example / 2:g}",
+                    argument=setting.argument,
+                )
+            return setting.default
         try:
-            weight = float(setting)
+            value = float(text)
         except ValueError:
-            reason = f"a specular weight is a number, not '{setting}'"
-            raise MdfconvError(reason, percent_hint(setting)) from None
-        if not 0 < weight <= 1:
-            raise MdfconvError(f"a specular weight is above 0 and at most 1, not {setting}")
-        return weight
+            reason = f"a {setting.name} is a number, not '{text}'"
+            raise MdfconvError(reason, percent_hint(text)) from None
+        if not (0 < value <= setting.largest and value < np.inf):
+            limit = "" if setting.largest == np.inf else f" and at most {setting.largest:g}"
+            raise MdfconvError(f"a {setting.name} is above 0{limit}, not {text}")
+        return value
 
 
 def _falling(scale: float, power: float) -> tuple[_Rule, _Rule]:
@@ -175,8 +272,16 @@ def _inverse_power(power: float) -> tuple[_Rule, _Rule]:
 _OBJ2GLTF_DARK = 0.1
 
 
-def _obj2gltf(weight: float) -> float:
-    return 1 - weight if weight < _OBJ2GLTF_DARK else 1.0
+def _obj2gltf(weight: Any) -> Any:
+    return np.where(np.less(weight, _OBJ2GLTF_DARK), 1 - weight, 1.0)
+
+
+# Blender's hardness, 1 to 511, in the range of Ns, which ends at 1000; 0 is the roughest.
+_HARDNESS = 1.9607843137254901
+_HARDEST = 511
+
+
+_SOURCE_LEAST, _SOURCE_RANGE = 1.0, 149.0
 
 
 # pbrt-v3's α as a polynomial of ln r, lowest power first, and from which r on it holds.
@@ -254,25 +359,55 @@ _SQUARE: tuple[_Rule, _Rule] = (lambda r, weight: np.square(r), lambda a, weight
 _PHONG = ("blinn-phong",)
 _GGX, _SLOPES = ("ggx",), ("ggx", "beckmann")
 _TO_MIRROR = (Clamp(0.0, 0.0),)
+_GGX_ROUGHNESS = "ggx:roughness"
+# A roughness is set with three digits at most.
+_ROUGHNESS_STEP = 0.001
 
 DIALECTS = (
     Dialect(
+        "blender-2.8", _PHONG, "r = 1 − √N/30", *_falling(900, 2),
+        "Blender 2.80 to 3.2, OBJ export", "io_scene_obj/export_obj.py; obj_export_mtl.cc",
+        clamps=_TO_MIRROR, roughness=same, texels=_GGX_ROUGHNESS,
+        library=LibraryNumbers(
+            "Ns = 900 (1 − r)²", r"# (?P<name>Blender)(?: (?P<version>[\d.]+))? MTL File",
+            _ROUGHNESS_STEP, before=(3, 3),
+        ),
+    ),
+    Dialect(
         "blender-obj", _PHONG, "r = 1 − √(N/1000)", *_falling(1000, 2),
-        "Blender, OBJ import and export", "wavefront_obj/importer/obj_import_mtl.cc",
+        "Blender from 3.3 on, OBJ import and export",
+        "wavefront_obj/importer/obj_import_mtl.cc; obj_export_mtl.cc",
         clamps=_TO_MIRROR, roughness=same, generators=("blender i/o", "khronos blender"),
-        provided="if its materials came from a Wavefront OBJ",
+        provided="if its materials came from a Wavefront OBJ", texels=_GGX_ROUGHNESS,
+        library=LibraryNumbers(
+            "Ns = 1000 (1 − r)²", r"# (?P<name>Blender)(?: (?P<version>[\d.]+))? MTL File",
+            _ROUGHNESS_STEP,
+        ),
+    ),
+    Dialect(
+        "blender-2.7", _PHONG, "Ns = 1.960784 (N − 1)",
+        lambda ns, _: ns / _HARDNESS + 1, lambda n, _: (n - 1) * _HARDNESS,
+        "Blender up to 2.79, OBJ export", "io_scene_obj/export_obj.py (specular_hardness)",
+        Parameter(
+            "shininess", "Ns", (0, 1000), -_HARDNESS, 1000.0, lower_closed=True, upper_closed=True,
+            larger_is_smoother=True,
+        ),
+        library=LibraryNumbers(
+            "Ns = 1.960784 (N − 1)", r"# (?P<name>Blender)(?:3D)? MTL File", 1.0
+        ),
     ),
     Dialect(
         "obj2gltf", _PHONG, "r = 1 − N/1000, times 1 − L below L = 0.1",
         lambda r, weight: 1000 * (1 - r / _obj2gltf(weight)),
         lambda n, weight: np.maximum(1 - n / 1000, 0) * _obj2gltf(weight),
         "CesiumGS obj2gltf", "lib/loadMtl.js",
-        clamps=_TO_MIRROR, specular=Specular.optional, roughness=same, generators=("obj2gltf",),
+        clamps=_TO_MIRROR, setting=_OPTIONAL_WEIGHT, roughness=same, generators=("obj2gltf",),
+        note="map_Ns is copied as it is, with factor 1",
     ),
     Dialect(
         "assimp-gltf", _PHONG, "r = 1 − L √(N/1000)", *_falling(1000, 2),
         "assimp, glTF 2 export", "code/AssetLib/glTF2/glTF2Exporter.cpp",
-        clamps=_TO_MIRROR, specular=Specular.needed, roughness=same,
+        clamps=_TO_MIRROR, setting=_WEIGHT, roughness=same,
         generators=("assimp", "open asset import library"),
     ),
     Dialect(
@@ -294,6 +429,7 @@ DIALECTS = (
         "trimesh/exchange/dae.py",
         _ABOVE_ZERO, roughness=same, note="α stored as roughness: one square root short",
         generators=("fbx2gltf",),
+        texels=SAME,
     ),
     Dialect(
         "peak", _PHONG, "r = (2/(N+2))^¼", *_inverse_power(4),
@@ -320,7 +456,7 @@ DIALECTS = (
         lambda r, weight: 5 * (1 - r) / (r * weight),
         lambda n, weight: 1 / (1 + 0.2 * weight * n),
         "VTK, glTF export", "IO/Export/vtkGLTFExporter.cxx",
-        _ABOVE_ZERO, specular=Specular.needed, roughness=same, generators=("vtk",),
+        _ABOVE_ZERO, setting=_WEIGHT, roughness=same, generators=("vtk",),
     ),
     Dialect(
         "ifcopenshell-gltf", _PHONG, "r = 1/N",
@@ -340,7 +476,7 @@ DIALECTS = (
         lambda n, weight: np.where((r := _inverse_power(2)[1](n, weight)) < _ADOBE_LEAST, 0, r),
         "Adobe USD plugins", "utils/src/materials.cpp",
         replace(_ROUGHNESS, lower=_ADOBE_LEAST), clamps=(Clamp(0.0, _ADOBE_LEAST),),
-        specular=Specular.needed, roughness=same,
+        setting=_WEIGHT, roughness=same,
     ),
     Dialect(
         "adobe-fbx", _PHONG, "N = 100 (1 − r)",
@@ -351,17 +487,56 @@ DIALECTS = (
     Dialect(
         "mitsuba-phong", _PHONG, "N = 2/α² − 2", *_inverse_power(2),
         "Mitsuba 0.6, distribution phong", "src/bsdfs/microfacet.h", _ALPHA,
+        texels=SAME,
     ),
     Dialect(
         "cycles-ashikhmin", ("blinn-phong", "ashikhmin-shirley"),
         "N = 2/r⁴ − 2", *_inverse_power(4),
         "Blender Cycles, Ashikhmin-Shirley", "src/kernel/closure/bsdf_ashikhmin_shirley.h",
         _ABOVE_ZERO,
+        texels=SAME,
     ),
     Dialect(
         "x3d", _PHONG, "N = 128 s",
         lambda s, weight: 128 * s, lambda n, weight: n / 128,
         "X3D and VRML shininess", "ISO/IEC 19775-1, Material", _SHININESS,
+        texels=SAME,
+    ),
+    Dialect(
+        "linear", _PHONG, "r = 1 − N/K",
+        lambda r, scale: scale * (1 - r), lambda n, scale: np.maximum(1 - n / scale, 0),
+        "shaders and importers, K = 100, 128, 256", "as in 1.0 - shininess / 128.0",
+        clamps=_TO_MIRROR, setting=_SCALE, roughness=same,
+    ),
+    Dialect(
+        "niftools", _PHONG, "r = 1/(N + 1)",
+        lambda r, _: 1 / r - 1, lambda n, _: 1 / (n + 1),
+        "niftools Blender add-on, NIF glossiness",
+        "nif_import/property/material/__init__.py (import_material_gloss)",
+        _ABOVE_ZERO, roughness=same,
+    ),
+    Dialect(
+        "source-phong", _PHONG, "n = 1 + 149 v, of the reflected ray; N = 4 n + 3",
+        lambda v, _: REFLECTED.decode(_SOURCE_LEAST + _SOURCE_RANGE * v),
+        lambda n, _: (REFLECTED.encode(n) - _SOURCE_LEAST) / _SOURCE_RANGE,
+        "Source engine, $phongexponenttexture", "skin_ps20b.fxc (fSpecExp)",
+        replace(_SMOOTHNESS, name="texel", symbol="v"), texels=SAME,
+        note="$phongexponent is n itself: blinn-phong:reflected",
+    ),
+    Dialect(
+        "povray", _PHONG, "N = 1/roughness",
+        lambda r, _: 1 / r, lambda n, _: 1 / n,
+        "POV-Ray, finish roughness", "documentation of finish, specular and roughness",
+        replace(_ABOVE_ZERO, upper=np.inf, upper_closed=False),
+        note="phong_size is the exponent of the reflected ray: blinn-phong:reflected",
+    ),
+    Dialect(
+        "ward", ("beckmann",), "m_B = α, nearly",
+        lambda alpha, _: alpha, lambda m, _: m,
+        "Radiance plastic and metal, Mitsuba 0.6 ward", "Ward 1992, isotropic model",
+        replace(_ALPHA, upper=np.inf, upper_closed=False), texels=SAME,
+        caution="the exponential of Ward's lobe is Beckmann's with m_B = α, its other factors are "
+        "not: the result is near, not equal",
     ),
     Dialect(
         "pbrt-v3", _SLOPES,
@@ -370,43 +545,51 @@ DIALECTS = (
         "pbrt-v3, remaproughness", "src/core/microfacet.h",
         replace(_ABOVE_ZERO, lower=_PBRT_LEAST, lower_closed=True),
         note="what is below 0.001 is read as 0.001",
+        texels=SAME,
     ),
     Dialect(
         "pbrt-v4", _SLOPES, "α = √r",
         lambda r, weight: np.sqrt(r), lambda alpha, weight: np.square(alpha),
         "pbrt-v4, remaproughness", "src/pbrt/util/scattering.h", _ABOVE_ZERO,
         note="its author: kept although incorrect (issue 479)",
+        texels=SAME,
     ),
     Dialect(
         "blender-2.7", _SLOPES, "α = r",
         lambda r, weight: r, lambda alpha, weight: alpha,
         "Blender before 2.8", "versioning code", _ABOVE_ZERO,
+        texels=SAME,
     ),
     Dialect(
         "gltf-glossiness", _GGX, "α = (1 − g)²",
         lambda g, weight: np.square(1 - g), lambda alpha, weight: 1 - np.sqrt(alpha),
         "glTF, KHR_materials_pbrSpecularGlossiness", "text of the extension", _GLOSSINESS,
+        texels=SAME,
     ),
     Dialect(
         "luxcore-glossy2", _GGX, "α = √(u v), for u = v",
         lambda u, weight: u, lambda alpha, weight: alpha,
         "LuxCore glossy2", "material.cpp; glossy2.cpp", replace(_ABOVE_ZERO, symbol="u"),
         note="its own Schlick lobe is GGX and not schlick",
+        texels=SAME,
     ),
     Dialect(
         "openpbr", _GGX, _OPENPBR.formula, *_SQUARE,
         "OpenPBR", "specification 1.1, specular_roughness_anisotropy", _ABOVE_ZERO,
         pairing=_OPENPBR,
+        texels=SAME,
     ),
     Dialect(
         "materialx", _SLOPES, _MATERIALX.formula, *_SQUARE,
         "MaterialX, roughness_anisotropy", "mx_roughness_anisotropy.glsl", _ABOVE_ZERO,
         pairing=_MATERIALX, note="α_x is at most 1; an a beyond 0.98 is read as 0.98",
+        texels=SAME,
     ),
     Dialect(
         "gltf-anisotropy", _GGX, _GLTF_ANISOTROPY.formula, *_SQUARE,
         "glTF, KHR_materials_anisotropy", "text of the extension", _ABOVE_ZERO,
         pairing=_GLTF_ANISOTROPY,
+        texels=SAME,
     ),
 )  # fmt: skip
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdfconv.distributions import Distribution, distribution, one_parameter_distribution
-from mdfconv.distributions.dialects import DIALECTS, Dialect, Specular, dialects_of
+from mdfconv.distributions.dialects import DIALECTS, SAME, Dialect, Specular, dialects_of
 from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.distributions.parameter import Encoding, Pairing, Parameter
 from mdfconv.errors import MdfconvError
@@ -147,7 +147,9 @@ def endpoint(name: str | Endpoint) -> Endpoint:
     head, colon, tail = name.partition(":")
     owner = _owner(head)
     if colon:
-        return Endpoint(owner, _encoding(owner, tail))
+        form = forms_of(owner).get(tail.strip().lower())
+        caution = form.caution if isinstance(form, Dialect) else ""
+        return Endpoint(owner, _encoding(owner, tail), caution)
     return Endpoint(owner, caution=owner.ambiguous.get(head.strip().lower(), ""))
 
 
@@ -230,14 +232,26 @@ def encodings_of(owner: Distribution) -> list[str]:
 def stored_forms(owner: Distribution) -> list[tuple[Endpoint, Dialect | None]]:
     """Return every form but the parameter itself, and the dialect that it is, if it is one.
 
-    A rule that needs a specular weight is given 1.
+    A rule that needs a setting is given a usual one.
     """
     forms: list[tuple[Endpoint, Dialect | None]] = []
     for name, form in forms_of(owner).items():
         dialect = form if isinstance(form, Dialect) else None
-        needs_weight = dialect is not None and dialect.specular is Specular.needed
-        forms.append((Endpoint(owner, _encoding(owner, name + ":1" * needs_weight)), dialect))
+        forms.append(
+            (Endpoint(owner, _encoding(owner, dialect.example if dialect else name)), dialect)
+        )
     return forms
+
+
+def texels_of(end: Endpoint) -> str:
+    """Return what textures of a program hold that stores numbers so; "" if it is not known.
+
+    It is the name of an endpoint: a program may store a number by its rule, and textures as they
+    are.
+    """
+    name = end.encoding.name.partition(":")[0] if end.encoding else ""
+    dialect = dialects_of(end.distribution.name).get(name)
+    return end.label if dialect is None or dialect.texels == SAME else dialect.texels
 
 
 def forms_of(owner: Distribution) -> dict[str, Encoding | Dialect]:

@@ -50,8 +50,10 @@ class GGX(base.AlphaDistribution, base.AnisotropicDistribution):
     meant_by: ClassVar = {
         **dict.fromkeys(("roughness", "principled", "disney", "blender"), "ggx:roughness"),
         **dict.fromkeys(("gltf", "pbr", "perceptual-roughness"), "ggx:roughness"),
+        **dict.fromkeys(("unreal", "ue4", "ue5", "maya", "3ds-max", "3dsmax"), "ggx:roughness"),
         "alpha": "ggx",
         **dict.fromkeys(("glossiness", "gloss", "smoothness"), "ggx:glossiness"),
+        **dict.fromkeys(("unity", "vray", "v-ray"), "ggx:glossiness"),
     }
     map_variables = base.BOUNDED_ALPHA_MAP
     printed = base.Printed.of_alpha(

@@ -253,3 +253,14 @@ GLOSSINESS = Encoding(
     lambda alpha: 1 - np.sqrt(alpha),
     "α = (1 − g)²",
 )
+# Phong's own exponent n, of the angle between the reflected ray and the viewer, which at normal
+# incidence is 2β: F = 1 − cos^(n+1) 2β. N = 4 n + 3 is what the fit that keeps the light of a
+# natural environment tends to as n grows (N = 43.05 for n = 10; N = 4 n + 2 has the same peak), and
+# leaves a relative error of 7 % at n = 1, 0.6 % at 10 and 0.04 % at 100.
+REFLECTED = Encoding(
+    "reflected",
+    Parameter("exponent", "n", (1.0, 2500.0), 0.0, lower_closed=True, larger_is_smoother=True),
+    lambda stored: 4 * stored + 3,
+    lambda exponent: (exponent - 3) / 4,
+    "N = 4 n + 3, of the reflected ray",
+)

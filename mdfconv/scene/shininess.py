@@ -10,10 +10,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mdfconv.conversion import convert
 from mdfconv.distributions import list_distributions
-from mdfconv.distributions.dialects import DIALECTS, Specular
+from mdfconv.distributions.dialects import DIALECTS, SAME, Specular
 from mdfconv.distributions.endpoint import endpoints, stored_forms
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
@@ -80,19 +81,20 @@ def fit_error(exponent: Array, metric: Metric) -> Array:
 
 # The programs that store a roughness for an exponent, and render it with GGX.
 IMPORTERS = {dialect.name: dialect for dialect in DIALECTS if dialect.roughness}
-# The specular weight for those whose rule depends on it.
-_FULL_WEIGHT = 1.0
 
 
-def importer_roughness(importer: str, exponent: Array) -> Array:
+def importer_roughness(importer: str, exponent: Array, weight: ArrayLike = 1.0) -> Array:
     """Return the roughness that one of `IMPORTERS` makes of exponents, from 0 to 1.
 
-    A rule that depends on the specular weight is given 1.
+    The specular weights are for rules that depend on one, shape as the exponents or one for all.
     """
     dialect = IMPORTERS[importer]
     assert dialect.roughness is not None
+    setting = np.asarray(weight)
+    if dialect.setting and dialect.specular is Specular.no:
+        setting = np.asarray(dialect.setting.example)
     with np.errstate(divide="ignore"):
-        stored = dialect.encode(exponent, _FULL_WEIGHT)
+        stored = dialect.encode(exponent, setting)
     clipped: Array = np.clip(dialect.roughness(stored), 0, 1)
     return clipped
 
@@ -112,15 +114,32 @@ class ImporterResult(NamedTuple):
     rmse: float
 
 
-def importer_results(exponent: Array, metric: Metric) -> list[dict[str, ImporterResult]]:
-    """Return what each of `IMPORTERS` makes of each exponent, shape (n,)."""
+def importer_results(
+    exponent: Array, metric: Metric, weight: ArrayLike = 1.0, known: Array | None = None
+) -> list[dict[str, ImporterResult]]:
+    """Return what each of `IMPORTERS` makes of each exponent, shape (n,).
+
+    The errors are relative to Blinn/Phong of the exponents, or to GGX of a roughness that is known
+    to be the surface's; NaN where it is not known.
+    """
     results: list[dict[str, ImporterResult]] = [{} for _ in exponent]
     for importer in IMPORTERS:
-        roughness = importer_roughness(importer, exponent)
+        roughness = importer_roughness(importer, exponent, weight)
         rmse = error_of(exponent, roughness, metric)
+        if known is not None:
+            rmse = np.where(np.isnan(known), rmse, _roughness_errors(known, roughness, metric))
         for result, *pair in zip(results, roughness.tolist(), rmse.tolist(), strict=True):
             result[importer] = ImporterResult(*pair)
     return results
+
+
+def _roughness_errors(known: Array, roughness: Array, metric: Metric) -> Array:
+    """Return the errors of GGX of each roughness in the place of GGX of a known one."""
+    converter = StoredConverter(*endpoints(ROUGHNESS, ROUGHNESS), metric)
+    rmse = converter.remaining(converter.source.decode_legal(known), roughness)
+    rmse[known == roughness] = 0.0
+    rmse[(roughness == 0) & (known > 0)] = np.inf
+    return rmse
 
 
 # Where the error of a rule for exponents is given.
@@ -132,9 +151,11 @@ def encoding_records(metric: Metric) -> list[dict[str, Any]]:
 
     A record has ``encoding`` as in ``"blinn-phong:fbx"``, its ``formula``, the legal ``range`` of
     the stored number, what is ``clamped``, the ``programs``, where their ``source`` is, a
-    ``note``, ``specular`` ("no", "optional" or "needed"), and of what stores a roughness for an
-    exponent ``roughness_100`` and ``rmse_100``, and so on for each of `EXPONENTS`: of GGX in
-    Blinn/Phong's place, with a specular weight of 1; infinite for a mirror.
+    ``note``, ``specular`` ("no", "optional" or "needed"), the symbol of the rule's ``setting``,
+    what the program's textures hold (``texels``: "same", an endpoint, or "" if it is not known),
+    and of what stores a roughness for an exponent ``roughness_100`` and ``rmse_100``, and so on
+    for each of `EXPONENTS`: of GGX in Blinn/Phong's place, with a specular weight of 1; infinite
+    for a mirror.
     """
     by_exponent = importer_results(np.array(EXPONENTS, float), metric)
     records = []
@@ -151,6 +172,8 @@ def encoding_records(metric: Metric) -> list[dict[str, Any]]:
                 "source": dialect.source if dialect else "",
                 "note": dialect.note if dialect else "",
                 "specular": (dialect.specular if dialect else Specular.no).value,
+                "setting": dialect.setting.symbol if dialect and dialect.setting else "",
+                "texels": dialect.texels if dialect else SAME,
             }
             for n, results in zip(EXPONENTS, by_exponent, strict=True):
                 roughness, rmse = results.get(name, (None, None))

@@ -81,7 +81,7 @@ def completed(words, number):
         (["mtl", "--to", "s"], 3, ["shininess"]),
         (["mitsuba", "--to", "b"], 3, ["beckmann"]),
         (["gltf", "--from", "blinn-phong", ":", "obj2"], 5, ["obj2gltf"]),
-        (["texture", "--from", "blinn-phong", ":", "l"], 5, ["log2"]),
+        (["texture", "--from", "blinn-phong", ":", "lo"], 5, ["log2"]),
         (["convert", "--to", "konvert", ":", "l"], 5, []),
     ],
 )

@@ -50,6 +50,7 @@ def test_list():
         **dict.fromkeys(next(iter(records.values())), ""),
         **{"encoding": "beckmann:roughness", "formula": "α = r²", "range": "0 < r ≤ 1"},
         "specular": "no",
+        "texels": "same",
     }
     assert run("list", "--encodings", "--format", "plain")[1].split()[:2] == [
         "beckmann:roughness",

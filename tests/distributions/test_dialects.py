@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import mdfconv
-from mdfconv.distributions.dialects import DIALECTS, Specular
-from mdfconv.distributions.endpoint import encodings_of, endpoint
+from mdfconv.distributions.dialects import DIALECTS, SAME, Specular
+from mdfconv.distributions.endpoint import encodings_of, endpoint, texels_of
 from mdfconv.errors import MdfconvError
 
 EXPONENTS = np.geomspace(0.3, 3e4, 20).tolist()
@@ -54,6 +54,14 @@ STORED = {
     "mitsuba-phong": lambda n, weight: math.sqrt(2 / (n + 2)),
     "cycles-ashikhmin": lambda n, weight: math.sqrt(math.sqrt(2 / (n + 2))),
     "x3d": lambda n, weight: n / 128,
+    # (30 (1 − r))² and 1000 (1 − r)² backwards.
+    "blender-2.8": lambda n, weight: 1 - math.sqrt(clamp(n, 0, 900)) / 30,
+    "blinn-phong:blender-2.7": lambda n, weight: (n - 1) * 1.9607843137254901,
+    "linear": lambda n, scale: clamp(1.0 - n / scale),
+    "niftools": lambda n, weight: 1 / (n + 1),
+    # The exponent of the reflected ray is (N − 3)/4.
+    "source-phong": lambda n, weight: ((n - 3) / 4 - 1) / 149,
+    "povray": lambda n, weight: 1 / n,
 }
 
 
@@ -76,6 +84,7 @@ READ = {
     "openpbr": lambda r: r * r,
     "materialx": lambda r: r * r,
     "gltf-anisotropy": lambda r: r * r,
+    "ward": lambda alpha: alpha,
 }
 
 
@@ -100,11 +109,22 @@ CASES = [(owner, dialect) for dialect in DIALECTS for owner in dialect.owners]
 IDS = [f"{owner}:{dialect.name}" for owner, dialect in CASES]
 
 
+def rule(table, owner, dialect):
+    """Return the rule of a dialect; one name may have another for each owner."""
+    return table.get(f"{owner}:{dialect.name}", table.get(dialect.name))
+
+
 def test_every_dialect_has_a_rule_of_its_source():
-    assert {dialect.name for dialect in DIALECTS} == set(STORED) | set(READ), (
+    missing = [
+        f"{owner}:{dialect.name}"
+        for owner, dialect in CASES
+        if not (rule(STORED, owner, dialect) or rule(READ, owner, dialect))
+    ]
+    assert not missing, (
         "each dialect has its rule in STORED (from the exponent) or READ (to α) of this file"
     )
-    assert not set(STORED) & set(READ)
+    names = {dialect.name for dialect in DIALECTS} | set(IDS)
+    assert set(STORED) | set(READ) <= names
     for dialect in DIALECTS:
         assert dialect.program
         assert dialect.source
@@ -113,13 +133,15 @@ def test_every_dialect_has_a_rule_of_its_source():
 
 @pytest.mark.parametrize(("owner", "dialect"), CASES, ids=IDS)
 def test_twenty_values_as_the_program_and_back(owner, dialect):
-    for weight in WEIGHTS[dialect.specular]:
-        setting = "" if dialect.specular is Specular.no else f":{weight}"
+    scaled = dialect.setting is not None and dialect.specular is Specular.no
+    for weight in (100, 128, 256) if scaled else WEIGHTS[dialect.specular]:
+        setting = f":{weight}" if dialect.setting else ""
         end = endpoint(f"{owner}:{dialect.name}{setting}")
         inside = 0
-        if dialect.name in STORED:
+        from_exponent = rule(STORED, owner, dialect)
+        if from_exponent:
             for n in EXPONENTS:
-                wanted = STORED[dialect.name](n, weight)
+                wanted = from_exponent(n, weight)
                 stored = end.encode(np.array([n]))
                 if np.isnan(stored[0]):
                     assert not end.stored.accepts(np.array(wanted))
@@ -133,7 +155,7 @@ def test_twenty_values_as_the_program_and_back(owner, dialect):
         else:
             stored = np.linspace(*end.stored.typical, 20)
             stored = stored[end.stored.accepts(stored)]
-            wanted = [READ[dialect.name](value) for value in stored]
+            wanted = [rule(READ, owner, dialect)(value) for value in stored]
             np.testing.assert_allclose(end.decode_legal(stored), wanted, rtol=1e-12)
             np.testing.assert_allclose(end.encode(np.array(wanted)), stored, rtol=1e-12)
             inside = stored.size
@@ -171,6 +193,19 @@ def test_what_is_clamped_has_no_inverse():
         ("blinn-phong:vtk-gltf:much", "a specular weight is a number, not 'much'"),
         ("blinn-phong:fbx:0.5", "fbx does not depend on a specular weight"),
         ("ggx:roughness:0.5", "ggx:roughness takes no '0.5'"),
+        ("blinn-phong:linear", "depends on the scale K; give it, as in blinn-phong:linear:64"),
+        ("blinn-phong:linear:0", "a scale is above 0, not 0"),
+        ("blinn-phong:linear:inf", "a scale is above 0, not inf"),
+        ("blinn-phong:linear:half", "a scale is a number, not 'half'"),
+        ("unity", "did you mean ggx:glossiness"),
+        ("unreal", "did you mean ggx:roughness"),
+        ("maya", "did you mean ggx:roughness"),
+        ("3ds Max", "did you mean ggx:roughness"),
+        ("V-Ray", "did you mean ggx:glossiness"),
+        ("radiance", "did you mean beckmann:ward"),
+        ("ward", "did you mean beckmann:ward"),
+        ("povray", "did you mean blinn-phong:povray"),
+        ("phong_size", "did you mean blinn-phong:reflected"),
         ("ggx:pbrt", "did you mean pbrt-v"),
         ("sawicki:fbx", "sawicki has no encoding 'fbx'"),
     ],
@@ -224,3 +259,39 @@ def test_pairs_of_arrays():
 def test_pairs_that_are_none(pair, ends, message):
     with pytest.raises(MdfconvError, match=message):
         mdfconv.convert(pair, *ends)
+
+
+def test_ward_is_near_and_says_so():
+    assert "near, not equal" in endpoint("beckmann:ward").caution
+    with pytest.warns(mdfconv.MdfconvWarning, match="near, not equal"):
+        assert mdfconv.convert(0.3, "beckmann:ward", "beckmann") == 0.3
+
+
+def test_source_of_an_engine():
+    # $phongexponent 150 is a white texel of the exponent map.
+    white = mdfconv.convert(1.0, "blinn-phong:source-phong", "blinn-phong")
+    assert white == mdfconv.convert(150.0, "blinn-phong:reflected", "blinn-phong") == 603
+
+
+@pytest.mark.parametrize(("owner", "dialect"), CASES, ids=IDS)
+def test_texels_are_known_names(owner, dialect):
+    assert dialect.texels in ("", SAME) or endpoint(dialect.texels)
+    end = endpoint(f"{owner}:{dialect.example}")
+    assert texels_of(end) == (end.label if dialect.texels == SAME else dialect.texels)
+
+
+def test_texels_of_what_is_no_dialect():
+    assert texels_of(endpoint("ggx")) == "ggx"
+    assert texels_of(endpoint("ggx:glossiness")) == "ggx:glossiness"
+
+
+@pytest.mark.parametrize("h", [0, 1, 2, 50, 51, 255, 511])
+def test_hardness_of_blender(h):
+    stored = (h - 1) * 1.9607843137254901
+    end = endpoint("blinn-phong:blender-2.7")
+    if h == 0:
+        # A uniform lobe, for which there is no exponent.
+        assert np.isnan(end.decode_legal(np.array([stored]))[0])
+    else:
+        assert end.decode([stored])[0] == pytest.approx(h, rel=1e-14)
+        assert end.encode(np.array([float(h)]))[0] == pytest.approx(stored, rel=1e-14)

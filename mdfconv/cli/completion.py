@@ -81,6 +81,16 @@ def texels(incomplete: str) -> list[str]:
     return [*endpoints(incomplete), *stored]
 
 
+def library_sources() -> list[str]:
+    """Return what Ns of a material library can be."""
+    from mdfconv.distributions.dialects import DIALECTS
+    from mdfconv.scene.mtl.meaning import AUTO
+    from mdfconv.scene.shininess import SHININESS
+
+    stored = [each for each in DIALECTS if each.roughness or each.library]
+    return [AUTO, SHININESS, *(f"{SHININESS}:{each.name}" for each in stored)]
+
+
 def furnace_brdfs(incomplete: str) -> list[str]:
     """Return the BRDFs that the furnace takes; once a colon is typed, the forms of a parameter."""
     from mdfconv.studies.furnace import list_models, model_distribution

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import chain
@@ -31,8 +31,8 @@ MATERIALS_SHOWN = 100
 _JSON = "--format json"
 # What JSON has of a file, in this order.
 _KEYS = (
-    "file", "output", "from", "to", "target", "metric", "count", "materials", "textures",
-    "includes", "problems", "notes",
+    "file", "output", "writer", "from", "why", "to", "target", "metric", "count", "materials",
+    "texels", "textures", "includes", "problems", "notes",
 )  # fmt: skip
 
 
@@ -74,6 +74,11 @@ class MaterialReport:
     exponent : str
         The field of a material that is an exponent of Blinn/Phong, if what importers make of it
         is to be shown.
+    weight : str
+        The field with the specular weight, NaN for 1; "" for a weight of 1.
+    surface : tuple of str
+        The fields with the exponent and, where that is NaN, the roughness that a material has;
+        none if it has the exponent that importers read.
     compare : callable, optional
         Adds other comparisons to the rows of materials.
     print_more : callable, optional
@@ -88,6 +93,8 @@ class MaterialReport:
     place: str = "line"
     remedies: Mapping[ProblemKind, str] = field(default_factory=dict)
     exponent: str = ""
+    weight: str = ""
+    surface: tuple[()] | tuple[str, str] = ()
     compare: Callable[[Sequence[Any], Rows], None] | None = None
     print_more: Callable[[dict[str, Any]], None] | None = None
 
@@ -136,16 +143,23 @@ class MaterialReport:
         known = [row for row in rows if math.isfinite(row[self.exponent])]
         if self.form == "table":
             known = known[: ROWS_SHOWN // len(IMPORTERS)]
-        exponents = np.array([row[self.exponent] for row in known])
-        for row, results in zip(known, importer_results(exponents, self.metric), strict=True):
-            row["importers"] = {name: result._asdict() for name, result in results.items()}
+        names = (self.exponent, self.weight, *self.surface)
+        exponent, weight, *surface = (
+            np.array([row[name] if name else 1.0 for row in known], float) for name in names
+        )
+        # A file need not have the weight.
+        weight = np.nan_to_num(weight, nan=1.0)
+        results = importer_results(exponent, self.metric, weight=weight, surface=surface)
+        for row, made in zip(known, results, strict=True):
+            row["importers"] = {name: result._asdict() for name, result in made.items()}
 
     def _print_tables(self, record: dict[str, Any], conversion: FileConversion) -> None:
         rows = record["materials"]
         if rows:
             headings = {key: text for key, text in self.headings.items() if key in rows[0]}
             cells = [{text: row[key] for key, text in headings.items()} for row in rows]
-            title = f"{record['file']}, {self.metric} metric"
+            source = f"from {record['from']}, " if "from" in record else ""
+            title = f"{record['file']}, {source}{self.metric} metric"
             self._print_table(cells, title, len(conversion.materials))
         else:
             typer.echo(f"{record['file']}: nothing to convert", err=True)
@@ -186,10 +200,12 @@ def convert_files(
     *,
     in_place: bool,
     force: bool,
+    dry_run: bool = False,
 ) -> None:
     """Convert files, write all or none, report, and exit with 1 if something had to be left.
 
-    Without an output, a file or a folder, they are converted in place.
+    Without an output, a file or a folder, they are converted in place; in a dry run nothing is
+    written, and no output is needed.
 
     Raises
     ------
@@ -197,39 +213,36 @@ def convert_files(
         If a file cannot be read, converted at all, or written; nothing is then changed.
     """
     from mdfconv.cli.outputs import Outputs, new_folder
-    from mdfconv.output.files import find_files, is_stream
+    from mdfconv.output.files import find_files
     from mdfconv.scene import material_files
 
-    # A second name may be meant for the result.
-    if in_place == (output is not None):
-        raise MdfconvError(
-            "a file is converted into another file or folder (--output), or in place (--in-place)",
-            "choose one of them",
-        )
+    if not dry_run or output is not None:
+        _check_choice(output, in_place=in_place)
     files = find_files(patterns)
     destinations = material_files.choose_outputs(files, output)
-    if output and material_files.is_folder(output):
+    inputs = *files, *report.metric.inputs
+
+    def check(paths: Iterable[Path], inputs: Sequence[Path]) -> None:
+        # A dry run may name what cannot be written.
+        if not dry_run:
+            Outputs(*paths, force=force, inputs=inputs)
+
+    if output and material_files.is_folder(output) and not dry_run:
         new_folder(context, Path(output))
     results = [[] if each.backup else [each.output] for each in destinations]
-    inputs = *files, *report.metric.inputs
-    Outputs(*chain(*results), force=force, inputs=inputs)
+    check(chain(*results), inputs)
     converted = []
     for destination, result in zip(destinations, results, strict=True):
         data = material_files.read_file(destination.source)
         conversion = convert(destination, data)
-        if conversion.files and is_stream(destination.output):
-            raise MdfconvError(f"no texture can stand beside {destination.output}: it is no file")
         # Which textures there are is known only now.
-        Outputs(*result, *conversion.files, force=force, inputs=(*inputs, *conversion.inputs))
+        check((*result, *conversion.files), (*inputs, *conversion.inputs))
         converted.append((destination, data, conversion))
-    written = material_files.write_conversions(converted, force=force)
+    written = material_files.write_conversions(converted, force=force, dry_run=dry_run)
     report.print([(destination, conversion) for destination, _, conversion in converted])
     for destination, _, conversion in converted:
         if destination in written:
-            beside = [path for path in (destination.backup, *conversion.files) if path]
-            for path in (destination.output, *beside):
-                tell(f"wrote {path}")
-            _tell_missing(destination, conversion)
+            _tell_written(destination, conversion, "would write" if dry_run else "wrote")
         else:
             tell(f"nothing to change in {destination.output}")
         _tell_notes(destination.source, conversion.notes)
@@ -238,6 +251,24 @@ def convert_files(
             tell(f"{destination.source}:{problem.place}: {text}: left as it is")
     if any(conversion.problems for *_, conversion in converted):
         raise typer.Exit(1)
+
+
+def _check_choice(output: str | None, *, in_place: bool) -> None:
+    """Refuse both an output and a conversion in place, and neither."""
+    # A second name may be meant for the result.
+    if in_place == (output is not None):
+        raise MdfconvError(
+            "a file is converted into another file or folder (--output), or in place (--in-place)",
+            "choose one of them",
+        )
+
+
+def _tell_written(destination: Destination, conversion: FileConversion, verb: str) -> None:
+    """Say which files were written, and which of those that a result names it does not find."""
+    beside = [path for path in (destination.backup, *conversion.files) if path]
+    for path in (destination.output, *beside):
+        tell(f"{verb} {path}")
+    _tell_missing(destination, conversion)
 
 
 def _tell_missing(destination: Destination, conversion: FileConversion) -> None:

@@ -243,14 +243,19 @@ def stored_forms(owner: Distribution) -> list[tuple[Endpoint, Dialect | None]]:
     return forms
 
 
+def dialect_of(end: Endpoint) -> Dialect | None:
+    """Return the dialect that an endpoint names; None if its form belongs to no program."""
+    name = end.encoding.name.partition(":")[0] if end.encoding else ""
+    return dialects_of(end.distribution.name).get(name)
+
+
 def texels_of(end: Endpoint) -> str:
     """Return what textures of a program hold that stores numbers so; "" if it is not known.
 
     It is the name of an endpoint: a program may store a number by its rule, and textures as they
     are.
     """
-    name = end.encoding.name.partition(":")[0] if end.encoding else ""
-    dialect = dialects_of(end.distribution.name).get(name)
+    dialect = dialect_of(end)
     return end.label if dialect is None or dialect.texels == SAME else dialect.texels
 
 

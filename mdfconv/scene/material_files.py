@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, AnyStr
 
 from mdfconv.errors import MdfconvError
-from mdfconv.output.files import write_files
+from mdfconv.output.files import is_stream, write_files
 from mdfconv.scene.stored import MaterialProblem
 from mdfconv.scene.texture.convert import convert_texture_bytes
 from mdfconv.scene.texture.rule import TextureRule
@@ -164,12 +164,16 @@ def read_file(path: Path) -> bytes:
 
 
 def write_conversions(
-    converted: Sequence[tuple[Destination, bytes, FileConversion]], *, force: bool = False
+    converted: Sequence[tuple[Destination, bytes, FileConversion]],
+    *,
+    force: bool = False,
+    dry_run: bool = False,
 ) -> list[Destination]:
     """Write all conversions and what goes beside them, backups first, or nothing.
 
     Each has its destination and its original. What a conversion in place does not change is not
-    written; `force` replaces files that exist, but no backups. Returns what was written.
+    written; `force` replaces files that exist, but no backups. Returns what was written, or would
+    be in a dry run.
 
     Raises
     ------
@@ -189,11 +193,14 @@ def write_conversions(
             backups[destination.backup] = destination.source
     new = set(backups)
     for destination, _, conversion in changed:
+        if conversion.files and is_stream(destination.output):
+            raise MdfconvError(f"no texture can stand beside {destination.output}: it is no file")
         results = {destination.output: conversion.data, **conversion.files}
         for path, data in results.items():
             if contents.setdefault(path, data) != data:
                 raise MdfconvError(f"two results would both be written to {path}")
         if not force:
             new |= conversion.files.keys() if destination.backup else results.keys()
-    write_files(contents, new=new, like=backups)
+    if not dry_run:
+        write_files(contents, new=new, like=backups)
     return [destination for destination, *_ in changed]

@@ -7,6 +7,7 @@ roughness by rules of their own: what they make of one, and what that costs, sta
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,9 +91,9 @@ def importer_roughness(importer: str, exponent: Array, weight: ArrayLike = 1.0) 
     """
     dialect = IMPORTERS[importer]
     assert dialect.roughness is not None
-    setting = np.asarray(weight)
-    if dialect.setting and dialect.specular is Specular.no:
-        setting = np.asarray(dialect.setting.example)
+    setting = np.asarray(dialect.setting.example if dialect.setting else 1.0)
+    if dialect.specular is not Specular.no:
+        setting = np.asarray(weight)
     with np.errstate(divide="ignore"):
         stored = dialect.encode(exponent, setting)
     clipped: Array = np.clip(dialect.roughness(stored), 0, 1)
@@ -115,30 +116,35 @@ class ImporterResult(NamedTuple):
 
 
 def importer_results(
-    exponent: Array, metric: Metric, weight: ArrayLike = 1.0, known: Array | None = None
+    exponent: Array,
+    metric: Metric,
+    *,
+    weight: ArrayLike = 1.0,
+    surface: Sequence[Array] = (),
 ) -> list[dict[str, ImporterResult]]:
     """Return what each of `IMPORTERS` makes of each exponent, shape (n,).
 
-    The errors are relative to Blinn/Phong of the exponents, or to GGX of a roughness that is known
-    to be the surface's; NaN where it is not known.
+    The errors are relative to the surface: its exponents or, where those are NaN, its roughness;
+    Blinn/Phong of the exponents that the importers read if it is not given.
     """
+    true_exponent, true_roughness = surface or (exponent, np.full_like(exponent, np.nan))
+    phong = ~np.isnan(true_exponent)
     results: list[dict[str, ImporterResult]] = [{} for _ in exponent]
     for importer in IMPORTERS:
         roughness = importer_roughness(importer, exponent, weight)
-        rmse = error_of(exponent, roughness, metric)
-        if known is not None:
-            rmse = np.where(np.isnan(known), rmse, _roughness_errors(known, roughness, metric))
+        rmse = _roughness_errors(true_roughness, roughness, metric)
+        rmse[phong] = error_of(true_exponent[phong], roughness[phong], metric)
         for result, *pair in zip(results, roughness.tolist(), rmse.tolist(), strict=True):
             result[importer] = ImporterResult(*pair)
     return results
 
 
 def _roughness_errors(known: Array, roughness: Array, metric: Metric) -> Array:
-    """Return the errors of GGX of each roughness in the place of GGX of a known one."""
+    """Return the errors of GGX of each roughness in the place of GGX of a known one, or NaN."""
     converter = StoredConverter(*endpoints(ROUGHNESS, ROUGHNESS), metric)
     rmse = converter.remaining(converter.source.decode_legal(known), roughness)
-    rmse[known == roughness] = 0.0
     rmse[(roughness == 0) & (known > 0)] = np.inf
+    rmse[known == roughness] = 0.0
     return rmse
 
 

@@ -206,6 +206,10 @@ class ProblemKind(Enum):
     TEXTURE = auto()
     # Its texture has losses, which were not accepted.
     LOSSY = auto()
+    # It has a roughness by its author, which was not to be overwritten.
+    AUTHORED = auto()
+    # What its texels are is not known.
+    TEXELS = auto()
     OTHER = auto()
 
 

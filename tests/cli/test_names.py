@@ -40,8 +40,8 @@ OPTIONS = {
     ("mitsuba", "--to"): ("in.xml", "-o", "out.xml"),
     ("furnace", "--brdf"): ("0.2", "--points", "3"),
 }
-# Options of these names whose words are none of distributions.
-OTHERS = {("mtl", "--to")}
+# Options of these names whose words are not distributions, or only some of them.
+OTHERS = {("mtl", "--to"), ("mtl", "--from")}
 # What takes a distribution as such: its parameter is not asked for there, and not printed.
 WITHOUT_FORMS = {
     ("plot-error", "--reference"), ("stability", "--mdf"), ("bench", "--from"), ("bench", "--to"),

@@ -14,12 +14,16 @@ _BLANKS = b" \t"
 # Indentation, keyword, blanks, value, and blanks with a comment. Blanks are taken all or none, so
 # that a long line takes no long time.
 _STATEMENT = re.compile(
-    rb"((?:\xef\xbb\xbf)?[ \t]*)(newmtl|Ns|Pr|map_Ns|map_Pr)(?=[ \t#]|\Z)([ \t]*)"
+    rb"((?:\xef\xbb\xbf)?[ \t]*)(newmtl|Ns|Pr|Ks|map_Ns|map_Pr)(?=[ \t#]|\Z)([ \t]*)"
     rb"((?:[^ \t#]++|[ \t]++(?=[^ \t#]))*+)(.*)\Z"
 )
 # In any case of letters, as readers take them.
 _TEXTURE = re.compile(rb"[ \t]*(?:map_\w+|bump|disp|decal|refl|norm)[ \t]+(.*)\Z", re.IGNORECASE)
 _NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\Z")
+# What follows "1." of an infinity or of what is no number: "#INF00", "#QNAN0", "#IND".
+_NO_NUMBER = re.compile(rb"#(?:INF|IND|QNAN|SNAN)")
+# Of linear red, green and blue, as importers of libraries take them.
+_LUMINANCE = (0.2125, 0.7154, 0.0721)
 _OPTION = re.compile(
     rb"-[A-Za-z]\w*(?:[ \t]+(?:[+-]?[\d.]\S*|on|off|[rgbmlz](?=[ \t])|\w+_\w+))+[ \t]+"
 )
@@ -130,15 +134,42 @@ def read_library(data: bytes) -> tuple[list[Line], list[MaterialBlock]]:
 
 
 def number(line: Line) -> float:
-    """Return the value of an Ns or a Pr; raise `MdfconvError` if it is none."""
-    shown = f"{line.keyword.decode()} '{line.value.decode(errors='replace')}'"
+    """Return the value of an Ns or a Pr; raise `MdfconvError` if it is not a finite number."""
+    shown = f"{line.keyword.decode()} '{line.value.decode(errors='replace')}"
+    if _NO_NUMBER.match(line.after):
+        shown += line.after.decode(errors="replace").split()[0]
+        raise MdfconvError(f"{shown}' is not a number", "a runtime of Microsoft writes that")
     if not _NUMBER.match(line.value):
-        raise MdfconvError(f"{shown} is not a number")
+        point = line.value.replace(b",", b".")
+        decimal = b"," in line.value and _NUMBER.match(point)
+        hint = f"it has a decimal comma: write {point.decode()}" if decimal else ""
+        raise MdfconvError(f"{shown}' is not a number", hint)
     value = float(line.value)
-    if not 0 <= value < math.inf or (line.keyword == b"Pr" and value > 1):
-        legal = "0 ≤ Pr ≤ 1" if line.keyword == b"Pr" else "Ns ≥ 0"
-        raise MdfconvError(f"{shown} is outside {legal}")
+    if line.keyword == b"Pr" and not 0 <= value <= 1:
+        raise MdfconvError(f"{shown}' is outside 0 ≤ Pr ≤ 1")
     return value
+
+
+def luminance(line: Line) -> float:
+    """Return the luminance of a colour such as Ks; NaN if it is not one or three numbers."""
+    words = line.value.split()
+    if len(words) not in (1, 3) or not all(map(_NUMBER.match, words)):
+        return math.nan
+    # A single number stands for all three.
+    colour = [float(word) for word in words] * (3 // len(words))
+    return math.fsum(weight * part for weight, part in zip(_LUMINANCE, colour, strict=True))
+
+
+def comments(lines: Iterable[Line]) -> list[tuple[int, str]]:
+    """Return the lines before the first statement that are comments, with their numbers."""
+    found = []
+    for line in lines:
+        if line.keyword:
+            break
+        text = line.before.removeprefix(_BYTE_ORDER_MARK).strip()
+        if text.startswith(b"#"):
+            found.append((line.number, text.decode(errors="replace")))
+    return found
 
 
 def named_files(lines: Iterable[Line]) -> list[str]:

@@ -1,0 +1,196 @@
+"""What Ns means in a material library: who wrote it, and by which rule."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mdfconv.distributions.dialects import DIALECTS, Dialect, LibraryNumbers
+from mdfconv.distributions.endpoint import Endpoint, dialect_of, endpoint
+from mdfconv.distributions.evaluation import Array, Mask
+from mdfconv.distributions.parameter import number_text
+from mdfconv.errors import MdfconvError
+from mdfconv.fitting.metrics import Metric
+from mdfconv.scene.shininess import SHININESS, fit_error, roughness_of
+
+AUTO = "auto"
+# Numbers have six decimals in libraries, and were single-precision before.
+_LAST_DECIMAL, _SINGLE = 1e-6, 1e-7
+_LARGEST = 1000.0
+
+
+@dataclass(frozen=True)
+class NsMeaning:
+    """What Ns is.
+
+    Parameters
+    ----------
+    end : Endpoint
+        Blinn's exponent, or a dialect of it. Of a program that makes Ns from a roughness, Ns is
+        the exponent of its rule; of any other, the number that it stores.
+    writer : str
+        The program that wrote the library, as in ``"Blender 3.3.1"``; "" where it is not known.
+    why : str
+        Why Ns is taken for that, in words.
+    line : int
+        The line that says so, counted from 1; 0 for none.
+    """
+
+    end: Endpoint
+    writer: str
+    why: str
+    line: int = 0
+
+    @cached_property
+    def dialect(self) -> Dialect | None:
+        """The dialect that it is; None of an exponent."""
+        return dialect_of(self.end)
+
+    @property
+    def is_roughness(self) -> bool:
+        """Whether Ns was made from the roughness of GGX, which then is known exactly."""
+        return self.dialect is not None and self.dialect.roughness is not None
+
+    def accepts(self, numbers: Array) -> Mask:
+        """Return which Ns the program writes, shape (n,)."""
+        if not self.is_roughness:
+            zero = not self.dialect and numbers == 0
+            legal: Mask = self.end.stored.accepts(numbers) | zero
+            return legal
+        assert self.end.encoding is not None
+        with np.errstate(all="ignore"):
+            back = self.end.encoding.decode(self.end.encoding.encode(numbers))
+        return np.isclose(back, numbers, rtol=1e-9, atol=1e-9)
+
+    @property
+    def legal(self) -> str:
+        """The range of Ns in words."""
+        if self.dialect is None:
+            return "Ns ≥ 0"
+        if not self.is_roughness:
+            return self.end.stored.legal
+        clamps = self.end.encoding.clamps if self.end.encoding else ()
+        above = [f" ≤ {number_text(clamp.limit)}" for clamp in clamps if clamp.above]
+        return f"0 ≤ Ns{above[0]}" if above else "Ns ≥ 0"
+
+    def converted(self, numbers: Array, metric: Metric) -> tuple[Array, Array, Array]:
+        """Return the exponents, NaN of a known roughness, the Pr and their errors, shape (n,)."""
+        if self.is_roughness:
+            encoding, dialect = self.end.encoding, self.dialect
+            assert encoding is not None
+            assert dialect is not None
+            assert dialect.roughness is not None
+            roughness = np.clip(dialect.roughness(encoding.encode(numbers)), 0, 1)
+            return np.full_like(numbers, np.nan), roughness, np.zeros_like(numbers)
+        exponent = self.end.encoding.decode(numbers) if self.end.encoding else numbers
+        # A rounded number may be a little below the exponent 0.
+        exponent = np.maximum(exponent, 0)
+        return exponent, roughness_of(exponent, metric), fit_error(exponent, metric)
+
+
+def asked_meaning(name: str) -> NsMeaning:
+    """Return what Ns is by a name such as ``"blinn-phong:blender-obj"``.
+
+    Raises
+    ------
+    MdfconvError
+        If it is not known, or does not say what Ns is.
+    """
+    end = endpoint(name)
+    dialect = dialect_of(end)
+    exponent = end.distribution.name == SHININESS
+    if not exponent or (end.encoding and not (dialect and (dialect.roughness or dialect.library))):
+        known = ", ".join(
+            f"{SHININESS}:{each.name}" for each in DIALECTS if each.library is not None
+        )
+        raise MdfconvError(
+            f"Ns of a library is not stored as {end.label}",
+            f"it is an exponent ({SHININESS}), or what a program made of one: {known}, …",
+            argument="source",
+        )
+    return NsMeaning(end, "", f"as given, {_rule(end)}")
+
+
+def likely_meaning(comments: Sequence[tuple[int, str]], numbers: Array) -> NsMeaning:
+    """Return what Ns is by the comments of a library, with their lines, and its numbers."""
+    for line, comment in comments:
+        found = [
+            (dialect, match)
+            for dialect in DIALECTS
+            if dialect.library
+            and (match := re.match(dialect.library.header, comment))
+            and _is_before(match, dialect.library)
+        ]
+        if found:
+            return _chosen(line, found, numbers)
+    exponent = endpoint(SHININESS)
+    return NsMeaning(exponent, "", "nothing says who wrote it: Ns is Blinn's exponent N")
+
+
+def _chosen(line: int, found: list[tuple[Dialect, re.Match[str]]], numbers: Array) -> NsMeaning:
+    """Return the meaning under which most numbers are such as authors set."""
+    match = found[0][1]
+    version = (match.groupdict().get("version") or "").strip(".")
+    writer = f"{match['name']} {version}".strip()
+    counts = [int(_usual(dialect, numbers).sum()) for dialect, _ in found]
+    best = int(np.argmax(counts))
+    dialect = found[best][0]
+    end = endpoint(f"{dialect.owners[0]}:{dialect.name}")
+    why = f"written by {writer}: {_rule(end)}"
+    others = [
+        other.name
+        for (other, _), count in zip(found, counts, strict=True)
+        if other is not dialect and count == counts[best] and _differs(dialect, other, numbers)
+    ]
+    if others:
+        why += f"; its numbers may be those of {' or '.join(others)} instead"
+    elif len(found) > 1:
+        why += ", as its numbers say"
+        if counts[best] < numbers.size:
+            why += f" ({counts[best]} of {numbers.size})"
+    return NsMeaning(end, writer, why, line)
+
+
+def _is_before(match: re.Match[str], library: LibraryNumbers) -> bool:
+    """Return whether the version of a header is one that writes such numbers, or not given."""
+    version = match.groupdict().get("version")
+    if not version or not library.before:
+        return True
+    return tuple(int(part) for part in re.findall(r"\d+", version)) < library.before
+
+
+def _usual(dialect: Dialect, numbers: Array) -> Mask:
+    """Return which Ns a program writes for what authors set, shape (n,)."""
+    assert dialect.library is not None
+    read, write = dialect.encode, dialect.decode
+    if dialect.roughness is None:
+        read, write = write, read
+    setting, step = dialect.setting_value(), dialect.library.step
+    with np.errstate(all="ignore"):
+        authored = step * np.rint(read(numbers, setting) / step)
+        written = write(authored, setting)
+    tolerance = _LAST_DECIMAL + _SINGLE * np.sqrt(_LARGEST * np.abs(numbers))
+    usual: Mask = np.abs(written - numbers) <= tolerance
+    return usual & NsMeaning(endpoint(f"{SHININESS}:{dialect.name}"), "", "").accepts(written)
+
+
+def _differs(one: Dialect, other: Dialect, numbers: Array) -> bool:
+    """Return whether two rules say different things of the numbers."""
+    if (one.roughness is None) != (other.roughness is None):
+        return numbers.size > 0
+    first, second = (each.encode(numbers, each.setting_value()) for each in (one, other))
+    return not np.allclose(first, second)
+
+
+def _rule(end: Endpoint) -> str:
+    """Return what Ns is, as a formula where one is known."""
+    dialect = dialect_of(end)
+    if dialect is None:
+        return "Ns is Blinn's exponent N"
+    if dialect.library:
+        return dialect.library.rule
+    return f"{dialect.formula}, N is Ns"

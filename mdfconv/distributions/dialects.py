@@ -97,12 +97,15 @@ class LibraryNumbers:
         What authors set is a multiple of it as a rule: of a hardness always.
     before : tuple of int
         The first version that writes it no longer; empty if all do.
+    never : str
+        A regular expression for a line that the program does not write; "" for none.
     """
 
     rule: str
     header: str
     step: float
     before: tuple[int, ...] = ()
+    never: str = ""
 
 
 @dataclass(frozen=True)
@@ -362,6 +365,8 @@ _TO_MIRROR = (Clamp(0.0, 0.0),)
 _GGX_ROUGHNESS = "ggx:roughness"
 # A roughness is set with three digits at most.
 _ROUGHNESS_STEP = 0.001
+# From 2.80 on Blender writes 1, or the metallic that is not 0.
+_BLACK_AMBIENT = r"Ka 0\.0+ 0\.0+ 0\.0+\s"
 
 DIALECTS = (
     Dialect(
@@ -370,7 +375,7 @@ DIALECTS = (
         clamps=_TO_MIRROR, roughness=same, texels=_GGX_ROUGHNESS,
         library=LibraryNumbers(
             "Ns = 900 (1 − r)²", r"# (?P<name>Blender)(?: (?P<version>[\d.]+))? MTL File",
-            _ROUGHNESS_STEP, before=(3, 3),
+            _ROUGHNESS_STEP, before=(3, 3), never=_BLACK_AMBIENT,
         ),
     ),
     Dialect(
@@ -381,7 +386,7 @@ DIALECTS = (
         provided="if its materials came from a Wavefront OBJ", texels=_GGX_ROUGHNESS,
         library=LibraryNumbers(
             "Ns = 1000 (1 − r)²", r"# (?P<name>Blender)(?: (?P<version>[\d.]+))? MTL File",
-            _ROUGHNESS_STEP,
+            _ROUGHNESS_STEP, never=_BLACK_AMBIENT,
         ),
     ),
     Dialect(

@@ -60,6 +60,16 @@ def test_headers_and_numbers_of_real_libraries(header, number, source, roughness
     assert not found.problems
 
 
+def test_a_black_ambient_colour_is_of_blender_before_2_8():
+    """Every undecided library of a field test had one: from 2.80 on it is never black."""
+    data = library(PYTHON, ["0.000000"])
+    assert "may be those of blender-2.7 instead" in convert_mtl(data).why
+    found = convert_mtl(data + b"Ka 0.000000 0.000000 0.000000\n")
+    assert found.source == "blinn-phong:blender-2.7"
+    assert found.why == "written by Blender: Ns = 1.960784 (N − 1)"
+    assert found.materials[0].exponent == 1
+
+
 def test_without_a_header_it_is_an_exponent():
     found = convert_mtl(b"# 3ds Max Wavefront OBJ Exporter\nnewmtl a\nNs 250\n")
     assert (found.source, found.writer, found.notes) == ("blinn-phong", "", ())

@@ -182,7 +182,7 @@ def convert_mtl(
         raise MdfconvError(f"a library is converted to roughness or shininess, not to '{to}'")
     keyword, target = _KEYWORDS[To(to)]
     lines, blocks = _read(data)
-    meaning = _meaning(lines, blocks, source) if target == b"Pr" else _EXPONENT
+    meaning = _meaning(data, lines, blocks, source) if target == b"Pr" else _EXPONENT
     sources, problems = _sources(blocks, keyword, meaning)
     materials = _converted(sources, to, metric_named(metric), meaning)
     edit = _Edit(keyword, target, replace, overwrite, texture_names)
@@ -293,7 +293,9 @@ def _read(data: bytes) -> tuple[list[Line], list[MaterialBlock]]:
     return lines, blocks
 
 
-def _meaning(lines: Sequence[Line], blocks: Sequence[MaterialBlock], source: str) -> NsMeaning:
+def _meaning(
+    data: bytes, lines: Sequence[Line], blocks: Sequence[MaterialBlock], source: str
+) -> NsMeaning:
     """Return what Ns is, as given or by what the library says."""
     if source.strip().lower() != AUTO:
         return asked_meaning(source)
@@ -301,7 +303,7 @@ def _meaning(lines: Sequence[Line], blocks: Sequence[MaterialBlock], source: str
     for line in (line for block in blocks for line in block.having(b"Ns")):
         with suppress(MdfconvError):
             numbers.append(statements.number(line))
-    return likely_meaning(statements.comments(lines), np.array(numbers, float))
+    return likely_meaning(statements.comments(lines), np.array(numbers, float), data)
 
 
 def _sources(
@@ -424,7 +426,7 @@ def library_texels(data: bytes, source: str = AUTO) -> str:
 
     It is the name of an endpoint; the source as for `convert_mtl`.
     """
-    meaning = _meaning(*_read(data), source)
+    meaning = _meaning(data, *_read(data), source)
     return texels_of(meaning.end) if meaning.dialect else TEXTURE_EXPONENT
 
 

@@ -115,8 +115,10 @@ def asked_meaning(name: str) -> NsMeaning:
     return NsMeaning(end, "", f"as given, {_rule(end)}")
 
 
-def likely_meaning(comments: Sequence[tuple[int, str]], numbers: Array) -> NsMeaning:
-    """Return what Ns is by the comments of a library, with their lines, and its numbers."""
+def likely_meaning(
+    comments: Sequence[tuple[int, str]], numbers: Array, data: bytes = b""
+) -> NsMeaning:
+    """Return what Ns is by the comments of a library, with their lines, its numbers and lines."""
     for line, comment in comments:
         found = [
             (dialect, match)
@@ -124,6 +126,7 @@ def likely_meaning(comments: Sequence[tuple[int, str]], numbers: Array) -> NsMea
             if dialect.library
             and (match := re.match(dialect.library.header, comment))
             and _is_before(match, dialect.library)
+            and not _is_excluded(dialect.library, data)
         ]
         if found:
             return _chosen(line, found, numbers)
@@ -148,7 +151,7 @@ def _chosen(line: int, found: list[tuple[Dialect, re.Match[str]]], numbers: Arra
     ]
     if others:
         why += f"; its numbers may be those of {' or '.join(others)} instead"
-    elif len(found) > 1:
+    elif len(found) > 1 and numbers.size:
         why += ", as its numbers say"
         if counts[best] < numbers.size:
             why += f" ({counts[best]} of {numbers.size})"
@@ -161,6 +164,12 @@ def _is_before(match: re.Match[str], library: LibraryNumbers) -> bool:
     if not version or not library.before:
         return True
     return tuple(int(part) for part in re.findall(r"\d+", version)) < library.before
+
+
+def _is_excluded(library: LibraryNumbers, data: bytes) -> bool:
+    """Return whether a library has a line that the program does not write."""
+    never = library.never.encode()
+    return bool(never) and re.search(rb"^\s*" + never, data, re.MULTILINE) is not None
 
 
 def _usual(dialect: Dialect, numbers: Array) -> Mask:

@@ -185,6 +185,8 @@ class MaterialReport:
             exponents = [getattr(each, self.exponent) for each in conversion.materials]
             count = len(IMPORTERS) * sum(map(math.isfinite, exponents))
             self._print_table(cells, "Importers", count)
+            if self.weight and any(math.isnan(row[self.weight]) for row in rows):
+                tell("note: materials without a specular colour get a specular weight of 1")
 
     def _print_table(self, rows: Rows, title: str, count: int) -> None:
         names, hidden = list(rows[0]), self.secondary

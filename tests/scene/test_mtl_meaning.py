@@ -254,6 +254,10 @@ def test_importers_are_compared_with_what_the_author_meant(tmp_path):
     assert importers["obj2gltf"]["roughness"] == pytest.approx(0.75 * 0.96)
     assert importers["obj2gltf"]["rmse"] > 0.3
     assert importers["assimp-gltf"]["roughness"] == pytest.approx(1 - 0.04 * math.sqrt(0.25))
+    assert "specular weight" not in run("mtl", "a.mtl", "--dry-run", "--compare", cwd=tmp_path)[2]
+    (tmp_path / "a.mtl").write_text(text.replace("Ks", "Kd"))
+    err = run("mtl", "a.mtl", "--dry-run", "--compare", cwd=tmp_path)[2]
+    assert "materials without a specular colour get a specular weight of 1" in err
 
 
 def test_a_dry_run_writes_nothing(tmp_path):

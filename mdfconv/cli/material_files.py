@@ -198,6 +198,7 @@ def convert_files(
     """
     from mdfconv.cli.outputs import Outputs, new_folder
     from mdfconv.output.files import find_files, is_stream
+    from mdfconv.output.kinds import refuse_foreign
     from mdfconv.scene import material_files
 
     # A second name may be meant for the result.
@@ -216,6 +217,7 @@ def convert_files(
     converted = []
     for destination, result in zip(destinations, results, strict=True):
         data = material_files.read_file(destination.source)
+        refuse_foreign(destination.source, data)
         conversion = convert(destination, data)
         if conversion.files and is_stream(destination.output):
             raise MdfconvError(f"no texture can stand beside {destination.output}: it is no file")

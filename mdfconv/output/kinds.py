@@ -115,7 +115,10 @@ def foreign(head: bytes, kinds: Sequence[Foreign] = FOREIGN) -> Foreign | None:
 
 
 def refuse_foreign(name: object, head: bytes, kinds: Sequence[Foreign] = FOREIGN) -> None:
-    """Raise `MdfconvError`, with the way out, if a file of this name is of a `foreign` kind."""
+    """Raise `MdfconvError`, with the way out, if a file is of a `foreign` kind.
+
+    Its name stands first; it is empty where who asks says of which file the error is.
+    """
     kind = foreign(head, kinds)
     if kind:
-        raise MdfconvError(f"{name} is {kind.name}", kind.way_out)
+        raise MdfconvError(f"{name} is {kind.name}".lstrip(), kind.way_out)

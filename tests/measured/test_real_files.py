@@ -92,6 +92,22 @@ def test_zeros_in_some_channels_or_of_one_angle_are_samples():
     assert slice_.notes == ()
 
 
+@pytest.mark.parametrize("alpha", [0.02, 0.05, 0.1])
+def test_zeros_of_rounding_may_be_left_out(alpha):
+    """Of a surface without a diffuse part, whose values are stored with two decimals."""
+    angles = np.meshgrid(np.radians([0.0, 20, 40]), np.radians(np.arange(-75.0, 76)))
+    incidence, scan = (angle.ravel() for angle in angles)
+    zero, away = np.zeros_like(scan), np.where(scan < 0, 0.0, np.pi)
+    lobe = ggx(vector(incidence, zero), vector(np.abs(scan), away), alpha)
+    values = np.round(SPECULAR * lobe, 2)[:, None]
+    samples = directional_samples("s", incidence, zero, np.abs(scan), away, values, ("a",))
+    best = fit(samples, ["ggx"], masking="none").results[0].fits[0]
+    assert np.count_nonzero(values == 0) > 80
+    assert best.parameter == pytest.approx(alpha, rel=2e-3)
+    assert best.linear["specular"][0] == pytest.approx(SPECULAR, rel=3e-3)
+    assert abs(best.linear["diffuse"][0]) < 0.005
+
+
 def test_nothing_but_zeros():
     theta = np.radians(np.arange(0.0, 60, 5))
     dark = directional_samples("s", theta, 0 * theta, theta, 0 * theta, 0 * theta[:, None], ("a",))

@@ -3,6 +3,7 @@
 import bz2
 import gzip
 import io
+import json
 import lzma
 import struct
 import tarfile
@@ -164,6 +165,22 @@ def test_every_command_names_a_pointer(tmp_path, command):
     said = "is a Git LFS pointer, not the file itself; fetch the file: git lfs pull"
     assert err == f"mdfconv: {path} {said}\n"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_textures_of_materials_are_named(tmp_path):
+    (tmp_path / "t.png").write_bytes(POINTER)
+    (tmp_path / "a.mtl").write_text("newmtl a\nNs 100\nmap_Ns t.png\n")
+    texture = {"index": 0}
+    material = {"pbrMetallicRoughness": {"metallicRoughnessTexture": texture}}
+    document = {"asset": {"version": "2.0"}, "images": [{"uri": "t.png"}]}
+    document |= {"textures": [{"source": 0}], "materials": [material]}
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    for name, arguments in (("a.mtl", []), ("a.gltf", ["--from", "ggx:alpha"])):
+        path, output = tmp_path / name, tmp_path / f"new_{name}"
+        command = path.suffix[1:]
+        status, _, err = run(command, path, "-o", output, "--textures", *arguments)
+        assert status == 1
+        assert "is a Git LFS pointer, not the file itself; fetch the file: git lfs pull" in err
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if "Radiance" not in name])

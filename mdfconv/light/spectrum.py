@@ -93,7 +93,8 @@ def _read_other(path: Path, head: bytes) -> Array:
         raise MdfconvError(f"cannot read {path}: {_first_line(fault)}")
     try:
         shape = source.spec()
-        if shape.getattribute("textureformat") == _CUBE or shape.height == 6 * shape.width:
+        is_strip = max(shape.width, shape.height) == 6 * min(shape.width, shape.height)
+        if is_strip or shape.getattribute("textureformat") == _CUBE:
             tool = " (exrenvmap -l, of OpenEXR)" if source.format_name() == "openexr" else ""
             raise MdfconvError(f"{path} is a cube map", _WAY_OUT + tool)
         if (shape.width, shape.height) != (shape.full_width, shape.full_height):

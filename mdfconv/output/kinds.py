@@ -71,7 +71,7 @@ FOREIGN = (
     Foreign("an HDF5 file", AS_TABLE, r"\x89HDF\r\n\x1a\n"),
     Foreign("a Parquet file", AS_TABLE, "PAR1"),
     Foreign("a WINDOW BSDF (XML)", AS_TABLE, r".*?<WindowElement[\s>]"),
-    Foreign("a scattering file of Speos (OPTIS)", AS_TABLE, _TEXT + "OPTIS - "),
+    Foreign("a surface file of Speos (OPTIS)", AS_TABLE, _TEXT + "OPTIS - "),
     Foreign("a PDF document", AS_TABLE, "%PDF-"),
     Foreign("a USDZ archive", _SCENE, _ZIP + r"[^/]{1,80}?\.usd"),
     Foreign("a USD file", _SCENE, "PXR-USDC|#usda "),

@@ -212,24 +212,28 @@ def test_arbitrary_bytes(rest, head_, data):
 
 
 def test_cube_maps_are_named(tmp_path):
-    pixels = np.random.default_rng(5).random((384, 64, 3), np.float32)
+    tall = np.random.default_rng(5).random((384, 64, 3), np.float32)
     way_out = "convert it to latitude and longitude, 2:1"
-    for name, kind, tool in (
-        ("cube.exr", "CubeFace Environment", " (exrenvmap -l, of OpenEXR)"),
-        ("strip.exr", "", " (exrenvmap -l, of OpenEXR)"),
-        ("strip.tif", "", ""),
+    tool = " (exrenvmap -l, of OpenEXR)"
+    for name, kind, pixels, said in (
+        ("cube.exr", "CubeFace Environment", tall, tool),
+        ("cross.exr", "CubeFace Environment", tall[:256, :48], tool),
+        ("strip.exr", "", tall, tool),
+        ("strip.tif", "", tall, ""),
+        ("wide.tif", "", tall.swapaxes(0, 1), ""),
     ):
         path = tmp_path / name
-        shape = OpenImageIO.ImageSpec(64, 384, 3, "float")
+        height, width = pixels.shape[:2]
+        shape = OpenImageIO.ImageSpec(width, height, 3, "float")
         if kind:
             shape.attribute("textureformat", kind)
         output = OpenImageIO.ImageOutput.create(str(path))
         output.open(str(path), shape)
-        output.write_image(pixels)
+        output.write_image(np.ascontiguousarray(pixels))
         output.close()
         with pytest.raises(MdfconvError) as caught:
             read_environment_map(path)
-        assert str(caught.value) == f"{path} is a cube map; {way_out}{tool}"
+        assert str(caught.value) == f"{path} is a cube map; {way_out}{said}"
     square = write_map(tmp_path / "ball.exr", np.ones((64, 64)))
     with pytest.raises(MdfconvError, match=f"not 64×64; {way_out}"):
         read_environment_map(square)

@@ -83,7 +83,7 @@ SAMPLES = {
         b'<?xml version="1.0" encoding="UTF-8"?>\n<!-- File produced by: x -->\n'
         b'<WindowElement xmlns="http://windows.lbl.gov">\n'
     ],
-    "a scattering file of Speos (OPTIS)": [
+    "a surface file of Speos (OPTIS)": [
         b"OPTIS - brdf surface file v9.0\n0\nScattering surface\n",
         b"\xef\xbb\xbfOPTIS - Anisotropic BSDF surface file v8.0\r\n",
     ],

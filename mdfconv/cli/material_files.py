@@ -17,6 +17,7 @@ from mdfconv.cli.options import flag, option
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import ROWS_SHOWN, print_table
 from mdfconv.errors import MdfconvError
+from mdfconv.output.kinds import refuse_foreign
 from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
@@ -198,7 +199,6 @@ def convert_files(
     """
     from mdfconv.cli.outputs import Outputs, new_folder
     from mdfconv.output.files import find_files, is_stream
-    from mdfconv.output.kinds import refuse_foreign
     from mdfconv.scene import material_files
 
     # A second name may be meant for the result.

@@ -108,7 +108,8 @@ def command(
 
     Of one angle, that of the half vector, the model is offset + scale · D̄(β); of two directions
     k_d/π + k_s D G F / (4 cos θ_i cos θ_o). A second parameter is fitted, too, unless --gamma
-    gives it. Ranks the fits, best first, and marks the simplest one that is nearly as good.
+    gives it. Samples of two directions that are exactly 0 are left out: the detector was in the
+    way of the light. Ranks the fits, best first, and marks the simplest one that is nearly as good.
     Several files make one table.
 
     Examples:

@@ -14,7 +14,7 @@ from mdfconv.output.records import csv_text, json_text
 
 _ROUGHNESSES = (0.05, 0.1, 0.2, 0.4)
 
-_MAP = argument("MAP", "Environment map, linear, 2:1: OpenEXR, Radiance .hdr or another picture.")
+_MAP = argument("MAP", "Environment map, linear, 2:1: OpenEXR, Radiance (.hdr, .pic) or others.")
 _M_B = option("M", "Beckmann's m_B; repeatable; by default 0.05 to 0.4.")
 
 

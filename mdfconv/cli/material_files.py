@@ -17,6 +17,7 @@ from mdfconv.cli.options import flag, option
 from mdfconv.cli.process import tell
 from mdfconv.cli.tables import ROWS_SHOWN, print_table
 from mdfconv.errors import MdfconvError
+from mdfconv.output.kinds import refuse_foreign
 from mdfconv.output.records import json_text
 
 if TYPE_CHECKING:
@@ -236,6 +237,7 @@ def convert_files(
     converted = []
     for destination, result in zip(destinations, results, strict=True):
         data = material_files.read_file(destination.source)
+        refuse_foreign(destination.source, data)
         conversion = convert(destination, data)
         # Which textures there are is known only now.
         check((*result, *conversion.files), (*inputs, *conversion.inputs))

@@ -12,6 +12,8 @@ import numpy as np
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array, gauss_panels
 from mdfconv.errors import MdfconvError
+from mdfconv.light.radiance import SIGNATURE, read_radiance
+from mdfconv.output.kinds import HEAD_BYTES, refuse_foreign
 
 # Of linear Rec. 709 (ITU-R BT.709), the primaries of OpenEXR and Radiance files.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
@@ -20,6 +22,9 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 _OVERSHOOT, _FILTER_WIDTH = 0.25, 9
 # Where a spectrum has a slope that means something.
 _LEAST_HEIGHT = 64
+# What OpenImageIO calls the cube map of an OpenEXR file.
+_CUBE = "CubeFace Environment"
+_WAY_OUT = "convert it to latitude and longitude, 2:1"
 
 
 def read_environment_map(path: str | Path) -> Array:
@@ -28,7 +33,7 @@ def read_environment_map(path: str | Path) -> Array:
     Parameters
     ----------
     path : str or Path
-        A picture that OpenImageIO reads, OpenEXR or Radiance .hdr for one; taken as linear. The
+        A Radiance picture, or one that OpenImageIO reads, OpenEXR for one; taken as linear. The
         first row is the zenith.
 
     Returns
@@ -45,7 +50,8 @@ def read_environment_map(path: str | Path) -> Array:
     pixels = _read(Path(path))
     height, width = pixels.shape[:2]
     if width != 2 * height:
-        raise MdfconvError(f"{path}: an environment map has a shape of 2:1, not {width}×{height}")
+        reason = f"{path}: an environment map has a shape of 2:1, not {width}×{height}"
+        raise MdfconvError(reason, _WAY_OUT)
     if height < _LEAST_HEIGHT:
         raise MdfconvError(f"{path}: a spectrum takes {_LEAST_HEIGHT} rows, not {height}")
     if not np.isfinite(pixels).all():
@@ -58,23 +64,39 @@ def read_environment_map(path: str | Path) -> Array:
 
 
 def _read(path: Path) -> Array:
-    """Return the first colour channels of a picture, shape (h, w, 1 to 3), float32."""
-    import OpenImageIO
-
-    # The library opens names with patterns in them, and devices; a file is what it is.
+    """Return luminance or the first colour channels of a picture, shape (h, w, 1 to 3), float32."""
+    # Libraries open names with patterns in them, and devices; a file is what it is.
     try:
-        regular = stat.S_ISREG(path.stat().st_mode)
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise MdfconvError(f"cannot read {path}: it is not a file")
+        with path.open("rb") as file:
+            head = file.read(HEAD_BYTES)
+            if head.startswith(SIGNATURE):
+                return read_radiance(head + file.read())
     except OSError as error:
         raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
-    except ValueError as error:  # a name with a 0 in it
+    except MdfconvError:
+        raise
+    except ValueError as error:  # a damaged picture, or a name with a 0 in it
         raise MdfconvError(f"cannot read {path}: {error}") from None
-    if not regular:
-        raise MdfconvError(f"cannot read {path}: it is not a file")
+    return _read_other(path, head)
+
+
+def _read_other(path: Path, head: bytes) -> Array:
+    """Return the first colour channels of a picture that is read by OpenImageIO."""
+    import OpenImageIO
+
     source = OpenImageIO.ImageInput.open(str(path))
     if source is None:
-        raise MdfconvError(f"cannot read {path}: {_first_line(OpenImageIO.geterror())}")
+        fault = OpenImageIO.geterror()
+        refuse_foreign(path, head)
+        raise MdfconvError(f"cannot read {path}: {_first_line(fault)}")
     try:
         shape = source.spec()
+        is_strip = max(shape.width, shape.height) == 6 * min(shape.width, shape.height)
+        if is_strip or shape.getattribute("textureformat") == _CUBE:
+            tool = " (exrenvmap -l, of OpenEXR)" if source.format_name() == "openexr" else ""
+            raise MdfconvError(f"{path} is a cube map", _WAY_OUT + tool)
         if (shape.width, shape.height) != (shape.full_width, shape.full_height):
             raise MdfconvError(f"{path}: a part of a larger picture is no environment map")
         channels = min(shape.nchannels, 3)

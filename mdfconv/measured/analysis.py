@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -68,7 +68,18 @@ class Analysis:
             for fit in result.fits
             for note in fit.notes
         ]
-        return (*self.samples.notes, *dict.fromkeys(texts))
+        return (*self.samples.notes, *self._impossible, *dict.fromkeys(texts))
+
+    @property
+    def _impossible(self) -> Iterator[str]:
+        """What no surface can be."""
+        best = (result.fits[0] for result in self.results)
+        largest = max(max(fit.linear.get("diffuse", (0.0,))) for fit in best)
+        if largest > 1:
+            yield (
+                f"k_d {largest:.3g} is more light than falls on the surface: the values are not "
+                "f_r in 1/sr but, for example, π f_r"
+            )
 
 
 def fit(
@@ -89,7 +100,8 @@ def fit(
     """Fit distributions to measurements, and rank them.
 
     Of one angle, that of the half vector, the model is offset + scale · D̄(β), divided by cos²β
-    for a BRDF; of two directions it is k_d/π + k_s D G F / (4 cos θ_i cos θ_o).
+    for a BRDF; of two directions it is k_d/π + k_s D G F / (4 cos θ_i cos θ_o), and samples that
+    are exactly 0 are left out.
 
     Parameters
     ----------
@@ -145,7 +157,7 @@ def fit(
         )
     model = BrdfModel(loss, masking, fresnel, robust)
     distributions = fitted_distributions(targets, gamma)
-    used = _restricted(name, samples, quantity, max_angle)
+    used = _without_shadow(_restricted(name, samples, quantity, max_angle), loss)
     results = []
     try:
         for part in _channels(used) if separate else [used]:
@@ -211,6 +223,26 @@ def _restricted(
         raise MdfconvError(f"{name}: no samples up to {limit:g}°")
     notes += note_of(~keep, f"samples beyond {limit:g}° are left out")
     return replace(samples.select(keep), notes=notes)
+
+
+def _without_shadow(samples: Measurements, loss: str) -> Measurements:
+    """Return the samples of two directions that are not 0; say so, and how others are taken.
+
+    No surface scatters exactly nothing: there the detector is in the way of the light.
+    """
+    notes = samples.notes
+    if isinstance(samples, DirectionalSamples) and samples.values.any():
+        dark = np.abs(samples.values).max(axis=1) == 0
+        text = "samples are exactly 0, as in the shadow of the detector, and left out"
+        notes += note_of(dark, text)
+        samples = samples.select(~dark)
+    lowest = samples.values.min(axis=1)
+    if loss == "log":
+        text = "samples have a value of 0 or less, which has no logarithm, and are left out"
+        notes += note_of(lowest <= 0, text)
+    else:
+        notes += note_of(lowest < 0, "samples have a negative value and are fitted as they are")
+    return replace(samples, notes=notes)
 
 
 def _channels(samples: Measurements) -> list[Measurements]:

@@ -23,6 +23,7 @@ FILES = {
     "utf-16": f"θi;φi;θo;φo;f_r\n{TABLE}".replace(",", ";").replace(".", ",").encode("utf-16"),
     "one angle": b"# theta_i = 30 deg\nn,theta,R\n" + rows(range(9), range(9), range(9)).encode(),
     "astm": f"NUM_POINTS 32\nVARS theta_i,phi_i,theta_s,phi_s,Red\n{TABLE}".encode(),
+    "mini-diff": f"NUM_POINTS 32\nVARS theta_i,phi_i,theta_s,Red\n{TABLE}".encode(),
     "zemax": zemax().encode(),
     "fred": fred().encode(),
     "alta": alta("ISOTROPIC_TL_TV_PROJ_DPHI", np.radians(ANGLES[:, [0, 2, 3]]), VALUES),
@@ -36,7 +37,10 @@ SETTINGS = settings(
 )
 # What parsers stumble over.
 PIECES = st.sampled_from(
-    [b"nan", b"inf", b"-1e308", b"1e309", b"\0", b"\xff", b'"', b",", b"\n", b"#", b"-", b"9" * 30]
+    [
+        *(b"nan", b"inf", b"1.#INF00", b"-1.#IND", b"-1e308", b"1e309", b"9" * 30),
+        *(b"\0", b"\xff", b'"', b",", b"\n", b"#", b"-"),
+    ]
 )
 
 

@@ -282,6 +282,7 @@ GOOD = glb(text_of(factor(0.9)), b"binary")
         (b'{"a\n":1}', "is no JSON"),
         (b'{"materials":{}}', "its materials are no array"),
         (b'{"asset":{"version":"1.0"}}', "is glTF of version 1.0, not 2.0"),
+        (b'{"asset":{"version":" "}}', "has an empty version of glTF; 2.0 is read"),
         (b'{"a":"\xff"}', "is no JSON: byte 6 is not UTF-8"),
         (b'{"a":' + b"[" * 100000 + b"]" * 100000 + b"}", "nested too deeply"),
         (b'{"a":' * 100000 + b"1" + b"}" * 100000, "nested too deeply"),

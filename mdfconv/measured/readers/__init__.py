@@ -11,11 +11,20 @@ from pathlib import Path
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, open_source
 from mdfconv.measured.samples import Measurements
+from mdfconv.output.kinds import AS_TABLE, FOREIGN, Foreign, refuse_foreign
 
 __all__ = ["READERS", "ReadOptions", "Reader", "Source", "list_readers", "read"]
 
 # In the order in which they are asked: text reads what no other one knows.
 _MODULES = ("merl", "rgl", "alta", "zemax", "fred", "astm", "text")
+
+# What other commands read, or what no reader can know the meaning of.
+_NO_MEASUREMENTS = (
+    *FOREIGN,
+    Foreign("a JSON file", AS_TABLE, r"(?:\xef\xbb\xbf)?\s*(?:\{|\[\s*[\[{\"])"),
+    Foreign("an XML file", AS_TABLE, r"(?:\xef\xbb\xbf)?\s*<\?xml\s"),
+    Foreign("a picture, not measurements", AS_TABLE, r"\x89PNG|\xff\xd8\xff|II\*\0|MM\0\*|v/1\x01"),
+)
 
 # The format whose cells can be chosen.
 _WITH_CELLS = "MERL"
@@ -59,6 +68,7 @@ def read(path: Path | str, options: ReadOptions | None = None) -> Measurements:
         source = open_source(path)
     except OSError as error:
         raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
+    refuse_foreign(source.path, source.head, _NO_MEASUREMENTS)
     options = options or ReadOptions()
     reader = next(reader for reader in READERS if reader.recognizes(source.path.name, source.head))
     if options.cells is not None and reader.name != _WITH_CELLS:

@@ -63,6 +63,13 @@ class ReadOptions:
     angle_is: str | None = None
     cells: int | None = None
 
+    @property
+    def by_number(self) -> bool:
+        """Whether columns are chosen, all of them by their numbers."""
+        directions = self.theta_i, self.phi_i, self.theta_o, self.phi_o
+        chosen = [name for name in (self.angle, *directions, *self.values) if name is not None]
+        return bool(chosen) and all(name.isdecimal() for name in chosen)
+
     def refuse(self, path: Path, reason: str) -> None:
         """Raise if anything is chosen for a file that leaves no choice."""
         if replace(self, cells=None) != ReadOptions():

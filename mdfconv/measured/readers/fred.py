@@ -10,6 +10,7 @@ import re
 import numpy as np
 
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, known_by
+from mdfconv.measured.readers.tables import number
 from mdfconv.measured.samples import DirectionalSamples, directional_samples
 
 _KNOWN_BY = re.compile(r"^\s*type\s+bsdf_data\b", re.M | re.I)
@@ -22,14 +23,14 @@ def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
     scale, to_radians = 1.0, np.pi / 180
     incidence: list[float] = []
     rows: list[list[float]] = []
-    for number, line in enumerate(source.lines(), start=1):
+    for place, line in enumerate(source.lines(), start=1):
         words = line.split()
         if not words or line.lstrip().startswith(_COMMENTS) or words[0].lower() == "type":
             continue
         if words[0].lower() == "format":
-            scale, to_radians = _format(source, number, line)
+            scale, to_radians = _format(source, place, line)
             continue
-        numbers = _numbers(source, number, line)
+        numbers = _numbers(source, place, line)
         if len(numbers) == 2:
             incidence = numbers
         elif len(numbers) == 3 and incidence:
@@ -37,7 +38,7 @@ def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
         else:
             reason = f"{len(numbers)} numbers" + ("" if incidence else " before an incidence")
             hint = "two are an incidence (θ φ), three a row (θ φ value)"
-            raise source.error(reason, hint, line=number)
+            raise source.error(reason, hint, line=place)
     if not rows:
         raise source.error("no rows θ φ value")
     table = np.array(rows)
@@ -49,22 +50,22 @@ def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
     )
 
 
-def _format(source: Source, number: int, line: str) -> tuple[float, float]:
+def _format(source: Source, place: int, line: str) -> tuple[float, float]:
     """Return the scale of the values and the factor to radians that a line of settings gives."""
     settings = {key.lower(): value for key, value in _SETTING.findall(line)}
     angles = settings.get("angles", "deg").lower()
     if angles not in ("deg", "rad") or settings.get("bsdf", "value").lower() != "value":
         hint = "angles=deg or angles=rad, and bsdf=value are read"
-        raise source.error(line.strip()[:60], hint, line=number)
-    (scale,) = _numbers(source, number, settings.get("scale", "1"))
+        raise source.error(line.strip()[:60], hint, line=place)
+    (scale,) = _numbers(source, place, settings.get("scale", "1"))
     return scale, np.pi / 180 if angles == "deg" else 1.0
 
 
-def _numbers(source: Source, number: int, line: str) -> list[float]:
+def _numbers(source: Source, place: int, line: str) -> list[float]:
     try:
-        return [float(word) for word in line.replace(",", " ").split()]
+        return [number(word) for word in line.replace(",", " ").split()]
     except ValueError:
-        raise source.error(f"not numbers: {line.strip()[:60]}", line=number) from None
+        raise source.error(f"not numbers: {line.strip()[:60]}", line=place) from None
 
 
 READER = Reader("FRED", known_by(_KNOWN_BY), _read)

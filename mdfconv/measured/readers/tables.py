@@ -37,7 +37,7 @@ _WORDS = {
     "illumination aoi",
     "outgoing": "o out outgoing output r refl reflected reflection s scat scatter scattered "
     "scattering v view viewing viewer detector det observer observation e exit emergent emission "
-    "exitant",
+    "exitant measure measured measurement",
     "difference": "delta relative rel diff difference",
     "half": "h half halfway",
     "unit": "deg degree degrees rad radian radians cos cosine",
@@ -138,12 +138,29 @@ def _words(name: str) -> frozenset[str]:
 
 _COMMENT = re.compile(r"^\s*(#+|%+|//+|!+)\s?")
 _COMMENT_HINT = "comments start with #, %, // or !"
+_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
+# What C programs of Windows print for what is no number: 1.#INF00, -1.#IND00, 1.#QNAN0.
+_MSVC = re.compile(r"([-+]?)1\.#(INF|IND|QNAN|SNAN)0*", re.I)
 # Lines by which the form of a table is decided.
 _LOOKED_AT = 50
 # What a cell of a second line of headers holds.
 _UNIT = re.compile(
     r"\W*|\W*(deg(ree)?s?|°|rad(ian)?s?|(1/)?sr(\^?-?1)?|nm|none|a\.?u\.?|w/.*)\W*", re.I
 )
+
+
+def number(text: str) -> float:
+    """Return the number that a text is, infinity and NaN included; raise ValueError if it is none.
+
+    Those are also known as older C libraries print them.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        unusual = _MSVC.fullmatch(text)
+        if not unusual:
+            raise
+        return float(unusual[1] + ("inf" if unusual[2].upper() == "INF" else "nan"))
 
 
 @dataclass(frozen=True)
@@ -167,7 +184,7 @@ class TableForm:
         if self.decimal_comma:
             cells = [cell.replace(",", ".") for cell in cells]
         try:
-            return [float(cell) if cell else np.nan for cell in cells]
+            return [number(cell) if cell else np.nan for cell in cells]
         except ValueError:
             return None
 
@@ -223,9 +240,10 @@ class Table:
         return MdfconvError(f"{self.path}: {reason}", hint, argument=argument)
 
 
-def parse_table(path: Path, lines: Iterable[str]) -> Table:
+def parse_table(path: Path, lines: Iterable[str], *, by_number: bool = False) -> Table:
     """Return the table that lines of text hold; those that start with #, %, // or ! are comments.
 
+    Columns that are chosen by number need no names: those that do not fit are passed over.
     Raises `MdfconvError` if there are no numbers, or a line has others than numbers or too many or
     few of them.
     """
@@ -238,8 +256,13 @@ def parse_table(path: Path, lines: Iterable[str]) -> Table:
     form = _form_of([line for _, line in rows[: _LOOKED_AT + 2]])
     headers, numbers = _numbers(path, rows, form)
     width = numbers.shape[1]
-    names, units = _headings(path, headers, width, form)
-    notes = ("commas are read as decimal points",) if form.decimal_comma else ()
+    notes: tuple[str, ...] = ()
+    if form.decimal_comma:
+        notes = ("commas are read as decimal points",)
+        comments = [_DECIMAL_COMMA.sub(".", comment) for comment in comments]
+    names, units = _headings(path, headers, width, form, by_number=by_number)
+    if headers and not names:
+        notes += (f"the names in line {headers[0][0]} are not those of {width} columns: not used",)
     is_named = bool(names)
     names = names or [str(index + 1) for index in range(width)]
     table = Table(path, names, units or [""] * width, numbers, is_named, comments, notes)
@@ -280,14 +303,16 @@ def _numbers(
 
 
 def _headings(
-    path: Path, headers: Sequence[tuple[int, str]], width: int, form: TableForm
+    path: Path, headers: Sequence[tuple[int, str]], width: int, form: TableForm, *, by_number: bool
 ) -> tuple[list[str], list[str]]:
     """Return the names and the units that the lines above the numbers give."""
     cells = [form.names(line, width) for _, line in headers]
     names, units = (*cells, [], [])[:2]
     if headers and len(names) != width:
-        place = f"{path}, line {headers[0][0]}"
-        raise MdfconvError(f"{place}: names {len(names)} columns where {width} are", _COMMENT_HINT)
+        if by_number:
+            return [], []
+        reason = f"{path}, line {headers[0][0]}: names {len(names)} columns where {width} are"
+        raise MdfconvError(reason, f"choose them by number; {_COMMENT_HINT}")
     is_of_units = len(units) == width and all(_UNIT.fullmatch(unit) for unit in units)
     if len(headers) > 1 and not is_of_units:
         raise _no_numbers(path, *headers[1])

@@ -21,13 +21,14 @@ from mdfconv.registry import unknown_name
 HALF, REFLECTED, INCIDENT = "half", "reflected", "incident"
 _MEANINGS = (HALF, REFLECTED, INCIDENT)
 # In the order of an option each: the zeniths are the first and the third.
-_DIRECTIONS = (Role.theta_i, Role.phi_i, Role.theta_o, Role.phi_o)
+DIRECTIONS = (Role.theta_i, Role.phi_i, Role.theta_o, Role.phi_o)
 # By what a name says its unit, the first of them that it has.
 _MARKS = {"cosine": ("cos",), "degrees": ("deg", "°"), "radians": ("rad",)}
 # The angle of incidence as a comment says it.
 _INCIDENCE = re.compile(
     r"\b(?:theta_?(?:i|in|inc)|θ_?(?:i|in)|aoi|(?:angle of )?incidence(?: angle)?|incident angle)"
-    r"\s*(?:\(\w*\)|\[\w*\])?\s*[:=]\s*(?P<number>[-+]?\d+(?:\.\d*)?)\s*(?P<unit>deg|°|rad)?",
+    r"\s*(?:\(\w*\)|\[\w*\])?\s*[:=]\s*(?P<number>[-+]?\d+(?:\.\d*)?)(?!,?\d)"
+    r"\s*(?P<unit>deg|°|rad)?",
     re.I,
 )
 _INCIDENCE_UNITS = {"deg": "degrees", "°": "degrees", "rad": "radians"}
@@ -71,7 +72,7 @@ class _Columns:
         columns = self._by_role()
         incidence = None if Role.theta_i in columns else self._incidence()
         if Role.theta_o not in columns or not (Role.theta_i in columns or incidence):
-            if any(getattr(self._options, role.name) for role in _DIRECTIONS):
+            if any(getattr(self._options, role.name) for role in DIRECTIONS):
                 hint = f"name both; there are {', '.join(table.names)}"
                 raise table.error("no column of the zenith of both directions", hint)
             return None
@@ -125,7 +126,7 @@ class _Columns:
     def _by_role(self) -> dict[Role, int]:
         """Return the columns of angles by what they hold."""
         table, options = self._table, self._options
-        named = {role: getattr(options, role.name) for role in _DIRECTIONS}
+        named = {role: getattr(options, role.name) for role in DIRECTIONS}
         chosen = {role: table.column(name) for role, name in named.items() if name}
         columns, bare = dict(chosen), []
         for index, name in self._names.items():
@@ -136,7 +137,7 @@ class _Columns:
                 bare.append(index)
             elif role in columns:
                 both = table.listed([columns[role], index])
-                argument = role.name if role in _DIRECTIONS else ""
+                argument = role.name if role in DIRECTIONS else ""
                 raise table.error(f"{both} are both the {role}", "choose one", argument=argument)
             else:
                 columns[role] = index
@@ -235,7 +236,7 @@ class _Columns:
             # Zeniths, unless they are called azimuths.
             zenith = max(
                 min(largest[zenith], largest.get(azimuth, np.inf))
-                for zenith, azimuth in (_DIRECTIONS[:2], _DIRECTIONS[2:])
+                for zenith, azimuth in (DIRECTIONS[:2], DIRECTIONS[2:])
                 if zenith in largest
             )
             top = max(largest.values())
@@ -246,9 +247,9 @@ class _Columns:
 
     def _exchanged(self, columns: dict[Role, int], horizon: float) -> dict[Role, int]:
         """Return the columns, zeniths and azimuths exchanged if the ranges allow nothing else."""
-        if not all(role in columns for role in _DIRECTIONS):
+        if not all(role in columns for role in DIRECTIONS):
             return columns
-        zeniths, azimuths = ([columns[role] for role in _DIRECTIONS[n::2]] for n in (0, 1))
+        zeniths, azimuths = ([columns[role] for role in DIRECTIONS[n::2]] for n in (0, 1))
         zenith, azimuth = (max(map(self._largest, pair)) for pair in (zeniths, azimuths))
         # All light along the normal, seen along the normal, from many sides: a scan across azimuths
         # that are called zeniths, all of which are 0.
@@ -260,7 +261,7 @@ class _Columns:
             "as azimuths, against their names: the ranges allow nothing else"
         )
         exchanged = (azimuths[0], zeniths[0], azimuths[1], zeniths[1])
-        return dict(zip(_DIRECTIONS, exchanged, strict=True))
+        return dict(zip(DIRECTIONS, exchanged, strict=True))
 
     def _largest(self, column: int) -> float:
         numbers = self._table.numbers[:, column]
@@ -331,7 +332,8 @@ def _fall(data: DirectionalSamples) -> float:
 
 
 def _read(source: Source, options: ReadOptions) -> Measurements:
-    return read_table(parse_table(source.path, source.lines()), options)
+    table = parse_table(source.path, source.lines(), by_number=options.by_number)
+    return read_table(table, options)
 
 
 READER = Reader("text", lambda name, head: True, _read)

@@ -17,6 +17,7 @@ from mdfconv.brdf import microfacet
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, known_by, turn_from_normal
+from mdfconv.measured.readers.tables import number
 from mdfconv.measured.samples import DirectionalSamples, directional_samples
 
 _KNOWN_BY = re.compile(r"^\s*AngleOfIncidence\s", re.M | re.I)
@@ -70,13 +71,14 @@ class _Words:
             raise self._source.error(f"truncated: it ends within {what}")
         word = ""
         try:
-            return np.array([float(word := self.next(what)) for _ in range(count)])
+            return np.array([number(word := self.next(what)) for _ in range(count)])
         except ValueError:
-            raise self.error(f"{what}: '{word[:30]}' is no number") from None
+            hint = "its decimal comma has to be a point" if "," in word else ""
+            raise self.error(f"{what}: '{word[:30]}' is no number", hint) from None
 
-    def error(self, reason: str) -> MdfconvError:
+    def error(self, reason: str, hint: str = "") -> MdfconvError:
         """Return an error about the word that was last read."""
-        return self._source.error(reason, line=self._words[max(self._at - 1, 0)][0])
+        return self._source.error(reason, hint, line=self._words[max(self._at - 1, 0)][0])
 
 
 def _read(source: Source, options: ReadOptions) -> DirectionalSamples:

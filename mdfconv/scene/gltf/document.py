@@ -47,9 +47,11 @@ class GltfDocument:
         self.json = read_json(self._text)
         asset = self.json.value.get("asset")
         self._asset = asset if isinstance(asset, dict) else {}
-        version = str(self._asset.get("version", "2.0"))
+        version = " ".join(str(self._asset.get("version", "2.0")).split())
+        if not version:
+            raise MdfconvError("has an empty version of glTF", "2.0 is read: set asset.version")
         if not version.startswith("2."):
-            raise MdfconvError(f"is glTF of version {' '.join(version.split())}, not 2.0")
+            raise MdfconvError(f"is glTF of version {version}, not 2.0")
         self.materials: list[Any] = self.json.value.get("materials", [])
         if not isinstance(self.materials, list):
             raise MdfconvError("is no glTF 2.0: its materials are no array")

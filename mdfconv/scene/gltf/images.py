@@ -13,6 +13,7 @@ from typing import Any
 from urllib.parse import quote, unquote
 
 from mdfconv.errors import MdfconvError
+from mdfconv.output.kinds import refuse_foreign
 from mdfconv.scene.gltf.document import GltfDocument, is_address
 from mdfconv.scene.gltf.json_edit import JsonText
 from mdfconv.scene.material_files import free_name, read_file
@@ -79,6 +80,7 @@ class GltfImages:
         for signature, suffix in _SIGNATURES.items():
             if content.startswith(signature):
                 return content, suffix
+        refuse_foreign("", content)
         raise MdfconvError("is neither PNG nor JPEG")
 
     def replace(self, image: int, content: bytes) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdfconv.errors import MdfconvError
+from mdfconv.output.kinds import HEAD_BYTES, refuse_foreign
 from mdfconv.scene.texture import headers
 from mdfconv.scene.texture.headers import PngHeader, Reason
 
@@ -174,8 +175,10 @@ def check_files(
 def _form_of(source: PictureFile) -> PictureForm:
     """Return the form of a file's content, if its name does not say another."""
     with reading(source), source.path.open("rb") as file:
-        start = file.read(8)
+        start = file.read(HEAD_BYTES)
     form = next((form for form in _FORMS if start.startswith(form.signatures)), None)
+    if form is None:
+        refuse_foreign(source, start)
     named = _form_named(source.path)
     if form is None and named is TGA and start:
         return TGA  # which has no signature

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from mdfconv.conversion import convert
 from mdfconv.distributions import list_distributions
-from mdfconv.distributions.dialects import DIALECTS, SAME, Specular
+from mdfconv.distributions.dialects import DIALECTS, SAME, Dialect, Specular
 from mdfconv.distributions.endpoint import endpoints, stored_forms
 from mdfconv.distributions.evaluation import Array
 from mdfconv.fitting.metrics import Metric
@@ -80,8 +80,13 @@ def fit_error(exponent: Array, metric: Metric) -> Array:
     return rmse
 
 
+def _importer(dialect: Dialect) -> str:
+    """Return the name of a rule, with the scale that is taken for an example."""
+    return dialect.name if dialect.specular is not Specular.no else dialect.example
+
+
 # The programs that store a roughness for an exponent, and render it with GGX.
-IMPORTERS = {dialect.name: dialect for dialect in DIALECTS if dialect.roughness}
+IMPORTERS = {_importer(dialect): dialect for dialect in DIALECTS if dialect.roughness}
 
 
 def importer_roughness(importer: str, exponent: Array, weight: ArrayLike = 1.0) -> Array:
@@ -182,7 +187,8 @@ def encoding_records(metric: Metric) -> list[dict[str, Any]]:
                 "texels": dialect.texels if dialect else SAME,
             }
             for n, results in zip(EXPONENTS, by_exponent, strict=True):
-                roughness, rmse = results.get(name, (None, None))
+                importer = _importer(dialect) if dialect else name
+                roughness, rmse = results.get(importer, (None, None))
                 record |= {f"roughness_{n}": roughness, f"rmse_{n}": rmse}
             records.append(record)
     return records

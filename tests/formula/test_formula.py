@@ -18,10 +18,11 @@ from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.fitting.solve import fit
 from mdfconv.formula import LANGUAGES, SearchProblem, cheapest, pareto_front, write_formula
+from mdfconv.formula.code import argument_name
 from mdfconv.formula.family import Formula, Shape
-from mdfconv.formula.languages import argument_name
 from mdfconv.formula.search import is_glossy
 from tests.cli.runner import run
+from tests.formula.running import RUN, with_naga
 
 # What the machine has: `.ci/run` installs both.
 COMPILERS = [name for name in ("gcc",) if shutil.which(name)]
@@ -147,6 +148,33 @@ def test_python_gives_the_nearest_end_outside_the_range(solved):
     np.testing.assert_array_equal(single, function(np.array(ends, np.float32)))
     assert function(0) == function(problem.low)
     assert math.isnan(function(math.nan))
+
+
+@pytest.mark.parametrize("language", [name for name in RUN if name not in ("c", "python")])
+def test_other_languages_compute_the_same(solved, wanted, language):
+    problem, formula, _ = solved
+    values = values_in(problem)
+    (got,) = RUN[language](write_formula(formula, problem, language), [values])
+    assert worst(problem, got, wanted) <= formula.error * 1.02 + 1e-6
+    beyond, ends = outside(problem)
+    (got,) = RUN[language](write_formula(formula, problem, language), [beyond])
+    (at_ends,) = RUN[language](write_formula(formula, problem, language), [ends])
+    np.testing.assert_array_equal(got, at_ends)
+
+
+def test_wgsl_computes_the_same():
+    """All at once, for the driver takes seconds to start."""
+    ends = [(endpoint(first), endpoint(last)) for first, last, *_ in CASES]
+    problems = [
+        SearchProblem(*pair, metric_named(case[2]), *case[3:5])
+        for pair, case in zip(ends, CASES, strict=True)
+    ]
+    formulas = [cheapest(problem, case[5]) for problem, case in zip(problems, CASES, strict=True)]
+    codes = [write_formula(*both, "wgsl") for both in zip(formulas, problems, strict=True)]
+    values = list(map(values_in, problems))
+    results = with_naga(codes, [[column] for column in values])
+    for problem, formula, column, (got,) in zip(problems, formulas, values, results, strict=True):
+        assert worst(problem, got, exact(problem, column)) <= formula.error * 1.02 + 1e-6
 
 
 @pytest.mark.parametrize("validator", VALIDATORS)
@@ -371,9 +399,23 @@ def test_command():
 ONE_LINE = {
     "glsl": "float w = clamp(exponent, 1.0, 10000.0); float v = {} + w * {}; return inversesqrt(v)",
     "hlsl": "float w = clamp(exponent, 1.0, 10000.0); float v = {} + w * {}; return rsqrt(v)",
+    "wgsl": "let w = clamp(exponent, 1.0, 10000.0); let v = {} + w * {}; return inverseSqrt(v)",
+    "metal": "float w = clamp(exponent, 1.0f, 10000.0f); float v = {}f + w * {}f; return rsqrt(v)",
+    "osl": "float w = clamp(exponent, 1.0, 10000.0); float v = {} + w * {}; return inversesqrt(v)",
     "c": "float w = fminf(fmaxf(exponent, 1.0f), 10000.0f); float v = {}f + w * {}f; "
     "return 1.0f / sqrtf(v)",
     "python": "w = np.clip(exponent, 1.0, 10000.0); v = {} + w * {}; return v ** -0.5",
+    "materialx": '<clamp name="w" type="float"> '
+    '<input name="in" type="float" interfacename="exponent" /> '
+    '<input name="low" type="float" value="1.0" /> '
+    '<input name="high" type="float" value="10000.0" /> </clamp> '
+    '<multiply name="multiply1" type="float"> <input name="in1" type="float" value="{1}" /> '
+    '<input name="in2" type="float" nodename="w" /> </multiply> '
+    '<add name="v" type="float"> <input name="in1" type="float" nodename="multiply1" /> '
+    '<input name="in2" type="float" value="{0}" /> </add> '
+    '<sqrt name="sqrt1" type="float"> <input name="in" type="float" nodename="v" /> </sqrt> '
+    '<divide name="divide1" type="float"> <input name="in1" type="float" value="1.0" /> '
+    '<input name="in2" type="float" nodename="sqrt1" /> </divide>',
     "latex": r"\alpha = \left({} + {} N\right)^{{-1/2}}",
 }
 

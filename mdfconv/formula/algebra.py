@@ -1,8 +1,8 @@
 """The simplest form of an expression: a sum of products of powers, in which equals cancel.
 
-A sum is held as ``{product: coefficient}``, both as sorted tuples, so that equal ones are equal
-to Python; a product is pairs of a factor and its exponent, a factor a variable, a function of sums
-or a sum itself.
+A sum is pairs of a product and its coefficient; a product is pairs of a factor and its exponent; a
+factor is a variable, a function of sums, or a sum. All are sorted tuples: what is equal is the same
+key. A sum is multiplied out only where terms cancel, for a product keeps more digits.
 """
 
 from __future__ import annotations
@@ -188,7 +188,7 @@ def _raised(terms: Sum, exponent: float) -> Sum:
 def _factored(terms: Sum, *, scaled: bool) -> tuple[Product, float, Sum]:
     """Return the product and the number that all terms have in common, and the sum of the rest.
 
-    That number is 1 if the terms have none; scaled, one of two terms is left with 1.
+    Scaled, the rest is the same for all multiples of a sum of two terms, so that its powers meet.
     """
     every = [dict(product) for product, _ in terms]
     common: Product = ()
@@ -196,15 +196,14 @@ def _factored(terms: Sum, *, scaled: bool) -> tuple[Product, float, Sum]:
         exponents = [product.get(factor, 0.0) for product in every]
         if min(exponents) > 0 or max(exponents) < 0:
             common += ((factor, min(exponents, key=abs)),)
-    sizes = {abs(coefficient) for _, coefficient in terms}
-    inverse = any(exponent < 0 for product in every for exponent in product.values())
-    coefficient = 1.0
-    if len(terms) == 1:
-        coefficient = terms[0][1]
-    elif (len(sizes) == 1 and (scaled or not inverse)) or (
-        scaled and len(terms) == 2 and 1 not in sizes
-    ):
-        coefficient = abs(terms[-1][1])
+    coefficient = terms[0][1] if len(terms) == 1 else 1.0
+    if len(terms) > 1:
+        sizes = {abs(size) for _, size in terms}
+        # 2/x² − 2 stays, 1000 − 1000 x is 1000 (1 − x).
+        quotient = any(exponent < 0 for product in every for exponent in product.values())
+        alike = len(sizes) == 1 and (scaled or not quotient)
+        if alike or (scaled and len(terms) == 2 and 1 not in sizes):
+            coefficient = abs(terms[-1][1])
     divisor = tuple((factor, -exponent) for factor, exponent in common)
     rest = _plus(*(((_product(product, divisor), c / coefficient),) for product, c in terms))
     return common, coefficient, rest

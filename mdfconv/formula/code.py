@@ -188,17 +188,16 @@ def _facts(formula: Formula, problem: SearchProblem) -> list[str]:
 
 def _exact_facts(relation: ExactRelation) -> list[str]:
     """Return what a reader of the code must know, in ASCII."""
-    source, target = relation.source, relation.target
-    ranges = (replace(one.parameter, symbol=one.symbol) for one in relation.stored(source))
-    legal = ", ".join(one.legal for one in ranges)
-    given, made = (
-        _end_text(end, ", ".join(one.symbol for one in relation.stored(end)))
-        for end in (source, target)
-    )
-    facts = [f"{given} to {made}, exact, for {ascii_text(legal)}."]
+    texts, ranges = [], []
+    for end in (relation.source, relation.target):
+        stored = relation.stored(end)
+        texts.append(_end_text(end, ", ".join(one.symbol for one in stored)))
+        legal = (replace(one.parameter, symbol=one.symbol).legal for one in stored)
+        ranges.append(ascii_text(", ".join(legal)))
+    facts = [f"{' to '.join(texts)}: exact, from {' to '.join(ranges)}."]
     if relation.is_pair:
         facts.append("The two axes of a surface; x is the rougher one.")
-    for end in (source, target):
+    for end in (relation.source, relation.target):
         symbols = end.stored.symbol, end.distribution.parameter.symbol
         clamps = end.encoding.clamps if end.encoding else ()
         facts += [f"{end.label}: {ascii_text(clamp.text(*symbols))}." for clamp in clamps]

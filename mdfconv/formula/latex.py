@@ -80,7 +80,7 @@ def _latex_operation(node: Expression, symbols: dict[str, str]) -> tuple[str, in
             return rf"\begin{{cases}} {cases} \end{{cases}}", _CHOICE
     name = {"minimum": "min", "maximum": "max"}[node.operation]
     both = ", ".join(_latex(one, symbols) for one in node.operands)
-    return rf"\{name}\left({both}\right)", _NAME
+    return rf"\{name}\left({both}\right)", _PRODUCT
 
 
 def _polynomial(node: Expression) -> tuple[tuple[float, ...], Expression | None]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from matplotlib.mathtext import MathTextParser
 
 import mdfconv
 from mdfconv.distributions import list_distributions, one_parameter_distributions
@@ -21,6 +22,7 @@ from mdfconv.formula.algebra import simplified
 from mdfconv.formula.expression import Expression, as_expression, number, variable
 from tests.cli.runner import run
 from tests.distributions.test_dialects import PAIRS
+from tests.formula.latex import evaluated
 from tests.formula.running import (
     PRECISION,
     RUN,
@@ -230,7 +232,7 @@ GLOSSINESS = {
 def test_a_glossiness_in_every_language(language):
     code = write_relation(relation_of(("ggx:glossiness", "ggx:roughness")), language)
     comments = [LANGUAGES[language].remark(text) for text in (
-        "ggx:glossiness g to ggx:roughness r, exact, for 0 <= g < 1.",
+        "ggx:glossiness g to ggx:roughness r: exact, from 0 <= g < 1 to 0 < r <= 1.",
         f"By mdfconv {mdfconv.__version__}.",
     )]  # fmt: skip
     wanted = GLOSSINESS[language].format("ggx_roughness_from_ggx_glossiness")
@@ -251,6 +253,33 @@ def test_pairs_against_their_sources(name):
     np.testing.assert_allclose(back[1][there], columns[1][there], atol=1e-7)
 
 
+@pytest.mark.parametrize("pair", EXAMPLES, ids=" to ".join)
+def test_latex_says_the_same(pair):
+    relation = relation_of(pair)
+    columns = columns_of(relation)
+    symbols = [one.symbol for one in relation.stored(relation.source)]
+    lines = write_relation(relation, "latex").splitlines()
+    equations = [line for line in lines if not line.startswith("%")]
+    wanted = with_python(write_relation(relation, "python"), columns)
+    for line, column in zip(equations, wanted, strict=True):
+        # Matplotlib has no cases.
+        if "cases" not in line:
+            text = re.sub(r".le ", r"\\leq ", line)
+            MathTextParser("path").parse(f"${text}$")
+        made = evaluated(line, dict(zip(symbols, columns, strict=True)))
+        np.testing.assert_allclose(made * np.ones(24), column, rtol=SINGLE, atol=SINGLE)
+
+
+@pytest.mark.parametrize("language", LANGUAGES.names)
+def test_every_pair_is_written_in_every_language(language):
+    for pair in SAME_LOBES:
+        if pair[1].partition(":")[2] not in IN_STEPS:
+            code = write_relation(relation_of(pair), language)
+            assert code.isascii()
+            assert all(code.count(a) == code.count(b) for a, b in ("()", "{}"))
+            assert code.count(r"\left") == code.count(r"\right")
+
+
 def test_a_fraction_in_latex():
     text = write_relation(relation_of(("smoothie", "ggx")), "latex").splitlines()[-1]
     root = r"\left(4 + \alpha_{s}^{2}\right)^{1/2}"
@@ -264,7 +293,10 @@ def test_a_fraction_in_latex():
 def test_the_comment_says_what_clamps():
     code = write_relation(relation_of(("blinn-phong:blender-obj", "blinn-phong:fbx")), "c")
     assert code.isascii()
-    assert "// blinn-phong:blender-obj r to blinn-phong:fbx r, exact, for 0 <= r <= 1." in code
+    start = (
+        "// blinn-phong:blender-obj r to blinn-phong:fbx r: exact, from 0 <= r <= 1 to 0 <= r <= 1."
+    )
+    assert code.startswith(start)
     assert "// blinn-phong:blender-obj: r = 0 is any N >= 1000." in code
     assert "// blinn-phong:fbx: r = 0 is any N >= 100." in code
 

@@ -22,6 +22,7 @@ from mdfconv.formula.code import argument_name
 from mdfconv.formula.family import Formula, Shape
 from mdfconv.formula.search import is_glossy
 from tests.cli.runner import run
+from tests.formula.latex import evaluated
 from tests.formula.running import RUN, with_naga
 
 # What the machine has: `.ci/run` installs both.
@@ -210,6 +211,13 @@ def test_latex_says_the_same(solved):
     condition = re.sub(r" \\cdot 10\^{(.*?)}", r"e\1", text.partition(r"\quad ")[2])
     low, _, high = condition.split(r" \le ")
     assert (float(low), float(high)) == (problem.low, problem.high)
+
+
+def test_latex_computes_the_same(solved, wanted):
+    problem, formula, _ = solved
+    line = write_formula(formula, problem, "latex").splitlines()[-1]
+    got = evaluated(line, {problem.source.stored.symbol: values_in(problem).astype(float)})
+    assert worst(problem, got, wanted) <= formula.error * 1.02 + 1e-6
 
 
 def test_the_comment_states_what_was_promised(solved):

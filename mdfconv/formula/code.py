@@ -113,7 +113,7 @@ def fitted_code(formula: Formula, problem: SearchProblem) -> Code:
     return Code(
         (problem.source, problem.target),
         [StoredNumber(name, given.symbol, within)],
-        [StoredNumber(made.name, made.symbol, made)],
+        [StoredNumber(_identifier(made.name), made.symbol, made)],
         [1 - value if is_glossy(problem.target) else value],
         _facts(formula, problem),
     )
@@ -127,7 +127,7 @@ def exact_code(relation: ExactRelation) -> Code:
     return Code(
         (relation.source, relation.target),
         arguments,
-        relation.stored(relation.target),
+        [replace(one, name=_identifier(one.name)) for one in relation.stored(relation.target)],
         relation.expressions([one.name for one in arguments]),
         _exact_facts(relation),
     )

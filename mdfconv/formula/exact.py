@@ -72,7 +72,8 @@ class ExactRelation:
         except (TypeError, AttributeError, NotImplementedError):
             ends = f"{self.source.label} to {self.target.label}"
             raise MdfconvError(
-                f"{ends} has no formula: its rule is computed in steps", "convert takes them"
+                f"{ends} has no formula: the rule of one is computed step by step",
+                "convert computes the numbers",
             ) from None
 
     # Rules are functions of arrays, which expressions stand for.

@@ -41,9 +41,12 @@ def _latex(node: Expression, symbols: dict[str, str], least: int = _CHOICE) -> s
     """Return an expression as LaTeX, in parentheses if it binds less than it must."""
     if node.operation in ("let", "clip"):
         return _latex(node.operands[0], symbols, least)
-    if node.is_atom:
-        return _latex_number(node.value) if node.is_number else symbols[node.name]
-    text, binds = _latex_operation(node, symbols)
+    if node.is_number:
+        text, binds = _latex_number(node.value), _NAME if node.value >= 0 else _SUM
+    elif node.is_atom:
+        text, binds = symbols[node.name], _NAME
+    else:
+        text, binds = _latex_operation(node, symbols)
     return text if binds >= least else rf"\left({text}\right)"
 
 

@@ -270,20 +270,41 @@ def stored_as(name, **options):
     )
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["scale", "u", "v", "w", "w2", "sqrt", "clamp", "fminf", "np", "half", "lambda", "float",
+NAMES = [
+    "scale", "u", "v", "w", "w2", "sqrt", "clamp", "fminf", "np", "half", "lambda", "float",
      "float3", "sample", "in", "m_B", "mean slope", "α", "2nd", "input", "register", "row__major",
-     "Texture"],
-)  # fmt: skip
-def test_any_name_of_a_parameter_is_valid_code(name, tmp_path):
-    # Of all shapes the one that needs most names: 1 − w⁴ under a root.
+     "Texture", "t1", "kernel", "device", "thread", "closure", "color", "normal", "point",
+     "emit", "fn", "let", "var", "loop", "self", "target", "mod", "ref", "macro", "super",
+     "override", "enable", "from", "await", "storage", "workgroup", "std", "handle", "move", "get",
+]  # fmt: skip
+# Of all shapes the one that needs most names: 1 − w⁴ under a root.
+MANY = Shape(variable=4.0, factor=1.0, outer=0.5, numerator=2, denominator=2)
+
+
+def with_many_names(name):
+    """Return a formula, what it is for, values of its argument and what it makes of them."""
     problem = SearchProblem(stored_as(name), endpoint("beckmann"), metric_named("unit"), 0.01, 0.8)
-    shape = Shape(variable=4.0, factor=1.0, outer=0.5, numerator=2, denominator=2)
-    formula = Formula(shape, (1.0, 0.5), (0.25, 0.125), 0.1)
     values = np.linspace(0.1, 0.8, 5)
     w4 = values**4
     wanted = np.sqrt(values * (1 + 0.5 * w4) / (1 + 0.25 * w4 + 0.125 * w4**2))
+    return Formula(MANY, (1.0, 0.5), (0.25, 0.125), 0.1), problem, values, wanted
+
+
+def test_any_name_of_a_parameter_is_valid_wgsl():
+    cases = list(map(with_many_names, NAMES))
+    codes = [write_formula(formula, problem, "wgsl") for formula, problem, *_ in cases]
+    for (*_, wanted), (got,) in zip(
+        cases, with_naga(codes, [[values] for *_, values, _ in cases]), strict=True
+    ):
+        np.testing.assert_allclose(got, wanted, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_any_name_of_a_parameter_is_valid_code(name, tmp_path):
+    formula, problem, values, wanted = with_many_names(name)
+    for language in ("metal", "osl", "materialx"):
+        (got,) = RUN[language](write_formula(formula, problem, language), [values])
+        np.testing.assert_allclose(got, wanted, rtol=1e-6)
     code = write_formula(formula, problem, "python")
     scope = {}
     exec(code, scope)

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mdfconv.cli import completion, options, tables
-from mdfconv.cli.options import flag, option
+from mdfconv.cli.options import Format, flag, option
+from mdfconv.cli.outputs import Outputs
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 
+if TYPE_CHECKING:
+    from mdfconv.formula import SearchProblem
+    from mdfconv.formula.code import Language
+
+# Parameters of the command that mean nothing for an exact formula.
+_OF_A_SEARCH = ("tolerance", "range_", "metric", "exposure", "every")
 _COLUMNS = ("operations", "worst_error", "formula")
 
 _TOLERANCE = option("T", "Worst relative error against the fit that is accepted.")
@@ -20,7 +28,12 @@ _RANGE = option(
     "0.1:0.9, exponents 1:10000.",
     "--range",
 )
-_LANGUAGE = option("LANG", "glsl, hlsl, c, python or latex.", "--lang", words=completion.languages)
+_LANGUAGE = option(
+    "LANG",
+    "glsl, hlsl, wgsl, metal, osl, c, python, materialx (a node graph) or latex.",
+    "--lang",
+    words=completion.languages,
+)
 _EVERY = flag("--all", "Print the table of cost against error instead, in that language.")
 
 
@@ -37,12 +50,17 @@ def command(
     language: Annotated[str, _LANGUAGE] = "glsl",
     every: Annotated[bool, _EVERY] = False,
     format_: options.FormatOption = None,
+    output: options.OutputOption = None,
+    force: options.ForceOption = False,
 ) -> None:
     """Print the cheapest formula for a conversion, to paste into a shader or an importer.
 
     Searches powers of polynomials and rational functions for the fewest operations whose worst
     relative error against the fit, in single precision, is within the tolerance. A value outside
     the range gives what the nearest end of it gives.
+
+    Between stored forms of the same lobe the formula is exact and needs no search, so that
+    tolerance, range and metric do not apply. Anisotropic forms have a formula for each number.
 
     Examples:
 
@@ -53,9 +71,20 @@ def command(
     mdfconv formula --from ggx --to beckmann --tolerance 1e-4 --range 0.05:0.5 --lang c
 
     mdfconv formula --from blinn-phong --to ggx --metric energy --all --lang latex
+
+    mdfconv formula --from ggx:glossiness --to ggx:roughness --lang wgsl
+
+    mdfconv formula --from ggx:openpbr --to ggx --lang materialx -o openpbr.mtlx
     """
     from mdfconv.distributions.endpoint import endpoints, with_specular
-    from mdfconv.formula import LANGUAGES, SearchProblem, cheapest, pareto_front, write_formula
+    from mdfconv.formula import (
+        LANGUAGES,
+        SearchProblem,
+        cheapest,
+        exact_relation,
+        write_formula,
+        write_relation,
+    )
 
     if every:
         options.refuse_given(
@@ -68,21 +97,45 @@ def command(
     chosen_language = LANGUAGES[language]  # names are wrong more often than ranges
     first, last = endpoints(*with_specular(source, target, specular), options.fixed_gamma(gamma))
     ends = options.noted(first), options.noted(last)
+    outputs = Outputs(None if every else output, force=force, table=output if every else None)
+    relation = exact_relation(*ends)
+    if relation:
+        why = f"goes with a search: {ends[0].label} to {ends[1].label} is exact"
+        options.refuse_given(context, _OF_A_SEARCH, why)
+        _write(write_relation(relation, language), output, outputs)
+        return
     low, high = ends[0].stored.typical if range_ is None else _range(range_)
     problem = SearchProblem(*ends, options.chosen_metric(metric, exposure), low, high)
     if every:
-        title = f"Formulas from {ends[0].label} to {ends[1].label}, {low:g} to {high:g}"
-        rows = [
-            {
-                "operations": formula.shape.operations,
-                "worst_error": float(f"{formula.error:.3g}"),
-                "formula": chosen_language.one_line(formula, problem),
-            }
-            for formula in pareto_front(problem)
-        ]
-        tables.write_table(_COLUMNS, rows, format_, title=title)
+        _write_front(problem, chosen_language, format_, outputs)
     else:
-        typer.echo(write_formula(cheapest(problem, tolerance), problem, language))
+        _write(write_formula(cheapest(problem, tolerance), problem, language), output, outputs)
+
+
+def _write(code: str, output: Path | None, outputs: Outputs) -> None:
+    if output:
+        outputs.write({output: f"{code}\n".encode()})
+    else:
+        typer.echo(code)
+
+
+def _write_front(
+    problem: SearchProblem, language: Language, format_: Format | None, outputs: Outputs
+) -> None:
+    """Write the table of cost against error."""
+    from mdfconv.formula import pareto_front
+
+    ends = f"{problem.source.label} to {problem.target.label}"
+    rows = [
+        {
+            "operations": formula.shape.operations,
+            "worst_error": float(f"{formula.error:.3g}"),
+            "formula": language.one_line(formula, problem),
+        }
+        for formula in pareto_front(problem)
+    ]
+    title = f"Formulas from {ends}, {problem.low:g} to {problem.high:g}"
+    tables.write_table(_COLUMNS, rows, format_, outputs, title=title)
 
 
 def _range(text: str) -> tuple[float, float]:

@@ -9,8 +9,9 @@ What is stored is first clamped to the range: outside, a formula may be 0, infin
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -134,14 +135,22 @@ def power(base: Array, exponent: float) -> Array:
     return base
 
 
-def evaluate(formula: Formula, w: Array) -> Array:
-    """Return t for w, in the type of w and by the steps of the code that is emitted."""
+def evaluate(
+    formula: Formula,
+    w: Any,
+    power: Callable[[Any, float], Any] = power,
+    named: Callable[[Any, str], Any] = lambda value, name: value,
+) -> Any:
+    """Return t for w, in the type of w and by the steps of the code that is emitted.
+
+    An expression w makes that of t, with its own `power` and with names for its parts.
+    """
     shape = formula.shape
     with np.errstate(all="ignore"):
-        u = power(w, shape.variable)
+        u = w if shape.variable == 1 else named(power(w, shape.variable), "u")
         value = horner(np.array(formula.numerator), u)
         if shape.factor:
-            value = power(w, shape.factor) * value
+            value = (u if shape.shares_factor else power(w, shape.factor)) * value
         if formula.denominator:
             value = value / horner(np.array([1.0, *formula.denominator]), u)
-        return power(value, shape.outer)
+        return value if shape.outer == 1 else power(named(value, "v"), shape.outer)

@@ -1,65 +1,121 @@
-"""Formulas as code to paste: GLSL, HLSL, C, Python and LaTeX.
+"""Formulas as text to paste: code of several languages, MaterialX and LaTeX.
 
-A new language of code is a `Syntax` that is added to `LANGUAGES`; LaTeX is not code and stands
-apart.
+A new language of code is a `Syntax` that is added to `LANGUAGES`; MaterialX is a graph, and LaTeX
+stands apart.
 """
 
 from __future__ import annotations
 
-import keyword
 import re
-import unicodedata
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from mdfconv import __version__
-from mdfconv.distributions.endpoint import Endpoint
-from mdfconv.distributions.parameter import number_text
+from mdfconv.formula.code import Code, Language, exact_code, fitted_code
+from mdfconv.formula.exact import ExactRelation
+from mdfconv.formula.expression import Expression, in_order, number
 from mdfconv.formula.family import Formula
-from mdfconv.formula.search import SearchProblem, is_glossy
+from mdfconv.formula.latex import Latex
+from mdfconv.formula.search import SearchProblem
 from mdfconv.registry import Registry
-
-# What an argument cannot be called: words of the emitted code, and of the languages. Words with
-# digits or capitals are not listed, as no argument has any.
-_WORDS = """
-    u v w sqrt sqrtf rsqrt inversesqrt clamp fminf fmaxf np
-
-    active alignas alignof asm asm_fragment atomic_uint attribute auto bool break buffer case cast
-    catch cbuffer centroid char class coherent column_major common compile compile_fragment const
-    const_cast constexpr continue default delete demote discard do double dword dynamic_cast else
-    enum explicit export extern external false filter fixed flat float for friend fxgroup goto
-    groupshared half highp if in inline inout input int interface invariant layout line lineadj
-    linear long lowp matrix mediump mutable namespace new noinline nointerpolation noperspective
-    nullptr operator out output packoffset partition pass patch pixelfragment point precise
-    precision private protected public readonly register reinterpret_cast resource restrict return
-    row_major sample sampler shared short signed sizeof smooth snorm stateblock static
-    static_assert static_cast string struct subroutine superp switch tbuffer technique template
-    texture this thread_local throw triangle triangleadj true try typedef typename typeof uint
-    uniform union unorm unsigned using varying vector vertexfragment virtual void volatile while
-    writeonly
-"""
-_TAKEN = {*_WORDS.split(), *keyword.kwlist}
 
 
 def _plain(value: float) -> str:
     return str(np.float32(value))
 
 
+def _single(value: float) -> str:
+    return f"{_plain(value)}f"
+
+
+def _double(value: float) -> str:
+    """Return a number in double precision, one of single precision in as few digits as there."""
+    return _plain(value) if float(np.float32(value)) == value else repr(value)
+
+
+class _Steps:
+    """Brings expressions to what languages have: powers in steps, a name for what stands twice."""
+
+    def __init__(self, expressions: Sequence[Expression]) -> None:
+        self._uses: Counter[int] = Counter()
+        self._done: dict[int, Expression] = {}
+        self._names = 0
+        for expression in expressions:
+            self._count(expression)
+        self.expressions = [self._lowered(expression) for expression in expressions]
+
+    def _count(self, node: Expression) -> None:
+        self._uses[id(node)] += 1
+        if self._uses[id(node)] == 1:
+            for operand in node.operands:
+                self._count(operand)
+
+    def _lowered(self, node: Expression) -> Expression:
+        if id(node) not in self._done:
+            result = self._in_steps(node)
+            again = self._uses[id(node)] > 1
+            self._done[id(node)] = self._atom(result) if again else result
+        return self._done[id(node)]
+
+    def _in_steps(self, node: Expression) -> Expression:
+        if not node.operands:
+            return node
+        first, *others = map(self._lowered, node.operands)
+        if node.operation == "power" and others[0].is_number:
+            return self._raised(first, others[0].value)
+        return Expression(node.operation, (first, *others), node.name)
+
+    def _atom(self, node: Expression) -> Expression:
+        if node.is_atom:
+            return node
+        self._names += 1
+        # No other name has digits.
+        return node.named(f"t{self._names}")
+
+    def _raised(self, base: Expression, exponent: float) -> Expression:
+        if exponent == 1:
+            return base
+        if abs(exponent) == 0.5:
+            return Expression("sqrt" if exponent > 0 else "inverse_root", (base,))
+        if abs(exponent) == 0.25:
+            return self._raised(Expression("sqrt", (base,)), 2 * exponent)
+        if exponent in (-1, -2, -3, -4):
+            return number(1) / self._raised(base, -exponent)
+        if exponent not in (2, 3, 4):
+            return Expression("power", (base, number(exponent)))
+        base = self._atom(base)
+        square = base * base
+        if exponent == 4:
+            square = self._atom(square)
+            return square * square
+        return square if exponent == 2 else square * base
+
+
+# How tightly a text binds: a choice, a sum, a quotient, a product, a power, a call.
+_CHOICE, _SUM, _QUOTIENT, _PRODUCT, _POWER, _CALL = range(6)
+# What an operator in a template makes of it.
+_BINDS = {"?": _CHOICE, " / ": _QUOTIENT, "**": _POWER}
+
+
 @dataclass(frozen=True)
-class Syntax:
+class Syntax(Language):
     """How a programming language writes what the formulas need; without words of its own as GLSL.
 
     Parameters
     ----------
     inverse_root, root, clamp : str
         1/√ and √ of an expression; one clamped to a lower and an upper bound.
+    power, minimum, maximum, log, select : str
+        One raised to another; the smaller and the larger of two; a natural logarithm; of four
+        the third if the first is less than the second, else the fourth.
     number : callable
         A number in single precision.
-    head, declare, end, foot : str
-        The line of the function with {name} and {argument}; a constant with {name} and {value};
-        what ends a statement; what ends the function.
+    head, argument, declare, end, foot : str
+        The line of the function with {name} and {arguments}; an argument; a constant with {name}
+        and {value}; what ends a statement; what ends the function.
     include : str
         What must stand before the function.
     comment : str
@@ -69,80 +125,195 @@ class Syntax:
     inverse_root: str
     root: str = "sqrt({})"
     clamp: str = "clamp({}, {}, {})"
+    power: str = "pow({}, {})"
+    minimum: str = "min({}, {})"
+    maximum: str = "max({}, {})"
+    log: str = "log({})"
+    select: str = "{} < {} ? {} : {}"
     number: Callable[[float], str] = _plain
-    head: str = "float {name}(float {argument}) {{"
+    head: str = "float {name}({arguments}) {{"
+    argument: str = "float {}"
     declare: str = "float {name} = {value}"
     end: str = ";"
     foot: str = "}"
     include: str = ""
     comment: str = "//"
 
-    def lines(self, formula: Formula, problem: SearchProblem) -> list[str]:
-        """Return the lines of a function of the source's stored value."""
-        argument = argument_name(problem.source.stored.name)
-        return [
-            *([self.include] if self.include else []),
-            self.head.format(name=function_name(problem), argument=argument),
-            *(f"    {statement}{self.end}" for statement in self._statements(formula, problem)),
-            *([self.foot] if self.foot else []),
-        ]
+    def lines(self, code: Code) -> list[str]:
+        """Return the lines of a function for each result."""
+        arguments = ", ".join(self.argument.format(one.name) for one in code.arguments)
+        lines = [self.include] if self.include else []
+        for result, expression in zip(code.results, code.expressions, strict=True):
+            lines += [] if result is code.results[0] else [""] * (1 if self.foot else 2)
+            name = code.function_name([result])
+            lines.append(self.head.format(name=name, arguments=arguments))
+            lines += [f"    {statement}{self.end}" for statement in self._statements(expression)]
+            lines += [self.foot] if self.foot else []
+        return lines
 
-    def one_line(self, formula: Formula, problem: SearchProblem) -> str:
-        """Return the statements of the function."""
-        return "; ".join(self._statements(formula, problem))
+    def short(self, code: Code) -> str:
+        """Return the statements of the functions."""
+        statements = (text for one in code.expressions for text in self._statements(one))
+        return "; ".join(statements)
 
-    def _statements(self, formula: Formula, problem: SearchProblem) -> list[str]:
-        constants, result = _body(formula, problem, self)
+    def _statements(self, expression: Expression) -> list[str]:
+        constants: dict[str, str] = {}
+        result = self._text(_Steps([expression]).expressions[0], constants)
         declared = [
             self.declare.format(name=name, value=value) for name, value in constants.items()
         ]
         return [*declared, f"return {result}"]
 
+    def _text(self, node: Expression, constants: dict[str, str], least: int = _CHOICE) -> str:
+        """Return an expression as text, in parentheses if it binds less than it must."""
+        if node.operation == "let":
+            if node.name not in constants:
+                constants[node.name] = self._text(node.operands[0], constants)
+            return node.name
+        if node.is_atom:
+            return self.number(node.value) if node.is_number else node.name
+        text, binds = self._operation(node, constants)
+        return text if binds >= least else f"({text})"
 
-class Latex:
-    """The formula as LaTeX."""
-
-    comment = "%"
-
-    def lines(self, formula: Formula, problem: SearchProblem) -> list[str]:
-        """Return the one line of an equation, with the range in which it holds."""
-        low, high = _latex_number(problem.low), _latex_number(problem.high)
-        condition = rf"{low} \le {_latex_symbol(problem.source)} \le {high}"
-        return [rf"{self.one_line(formula, problem)}, \quad {condition}"]
-
-    def one_line(self, formula: Formula, problem: SearchProblem) -> str:
-        """Return the equation."""
-        shape = formula.shape
-        symbol = _latex_symbol(problem.source)
-        base = f"(1 - {symbol})" if is_glossy(problem.source) else symbol
-        value = _latex_polynomial(formula.numerator, base, shape.variable)
-        if formula.denominator:
-            down = _latex_polynomial((1.0, *formula.denominator), base, shape.variable)
-            value = rf"\frac{{{value}}}{{{down}}}"
-        elif shape.factor and shape.has_terms:
-            value = rf"\left({value}\right)"
-        if shape.factor and not shape.has_terms:
-            value = f"{value} {_latex_power(base, shape.factor)}"
-        elif shape.factor:
-            value = f"{_latex_power(base, shape.factor)} {value}"
-        if shape.outer != 1:
-            value = rf"\left({value}\right)^{{{_exponent(shape.outer)}}}"
-        elif is_glossy(problem.target):
-            value = rf"\left({value}\right)"
-        start = "1 - " if is_glossy(problem.target) else ""
-        return f"{_latex_symbol(problem.target)} = {start}{value}"
+    def _operation(self, node: Expression, constants: dict[str, str]) -> tuple[str, int]:
+        if node.operation in _ARITHMETIC:
+            sign, binds, needed = _ARITHMETIC[node.operation]
+            first, second = in_order(node)
+            left = self._text(first, constants, min(binds, _QUOTIENT))
+            return f"{left} {sign} {self._text(second, constants, needed)}", binds
+        template = getattr(self, _TEMPLATES.get(node.operation, node.operation))
+        # Without a call around them they are bound by an operator.
+        inside = _CHOICE if "(" in template else _CALL
+        text = template.format(*(self._text(one, constants, inside) for one in node.operands))
+        return text, min((_BINDS[sign] for sign in _BINDS if sign in template), default=_CALL)
 
 
-LANGUAGES: Registry[Syntax | Latex] = Registry("language")
+# The sign, how tightly it binds, and how tightly what follows it must.
+_ARITHMETIC = {
+    "add": ("+", _SUM, _QUOTIENT),
+    "subtract": ("-", _SUM, _QUOTIENT),
+    "multiply": ("*", _PRODUCT, _PRODUCT),
+    "divide": ("/", _QUOTIENT, _POWER),
+}
+_TEMPLATES = {"sqrt": "root", "clip": "clamp"}
+
+
+class MaterialX(Language):
+    """The formula as a graph of MaterialX's standard nodes."""
+
+    # The category of a node, and its inputs.
+    _NODES: ClassVar = {
+        "add": ("add", "in1", "in2"),
+        "subtract": ("subtract", "in1", "in2"),
+        "multiply": ("multiply", "in1", "in2"),
+        "divide": ("divide", "in1", "in2"),
+        "power": ("power", "in1", "in2"),
+        "minimum": ("min", "in1", "in2"),
+        "maximum": ("max", "in1", "in2"),
+        "clip": ("clamp", "in", "low", "high"),
+        "sqrt": ("sqrt", "in"),
+        "log": ("ln", "in"),
+        # in1 where value1 > value2
+        "select": ("ifgreater", "value2", "value1", "in1", "in2"),
+        "number": ("constant", "value"),
+        "variable": ("dot", "in"),
+    }
+
+    def remark(self, text: str) -> str:
+        """Return a comment, in which XML has no two hyphens in a row."""
+        return f"<!-- {re.sub('-(?=-)', '- ', text)} -->"
+
+    def lines(self, code: Code) -> list[str]:
+        """Return a document with a graph that has an output for each result."""
+        nodes, ends = self._nodes(code)
+        typical = {one.name: _plain(one.parameter.typical_value) for one in code.arguments}
+        inputs = [
+            f'<input name="{name}" type="float" value="{value}" />'
+            for name, value in typical.items()
+        ]
+        outputs = [
+            f'<output name="{one.name}_out" type="float" nodename="{end}" />'
+            for one, end in zip(code.results, ends, strict=True)
+        ]
+        return [
+            '<materialx version="1.38">',
+            f'  <nodegraph name="{code.function_name(code.results)}">',
+            *(f"    {line}" for line in (*inputs, *nodes, *outputs)),
+            "  </nodegraph>",
+            "</materialx>",
+        ]
+
+    def short(self, code: Code) -> str:
+        """Return the nodes."""
+        return " ".join(line.strip() for line in self._nodes(code)[0])
+
+    def _nodes(self, code: Code) -> tuple[list[str], list[str]]:
+        """Return the lines of the nodes, and the names of those that are the results."""
+        lines: list[str] = []
+        made: dict[str, str] = {}
+        counts: Counter[str] = Counter()
+
+        def written(node: Expression, name: str = "") -> str:
+            """Write a node after those that it needs, and return its name."""
+            if node.operation == "let":
+                if node.name not in made:
+                    made[node.name] = written(node.operands[0], node.name)
+                return made[node.name]
+            if node.operation == "inverse_root":
+                node = number(1) / Expression("sqrt", node.operands)
+            category, *inputs = self._NODES[node.operation]
+            values = list(map(source, node.operands or (node,)))
+            counts[category] += 1
+            name = name or f"{category}{counts[category]}"
+            lines.append(f'<{category} name="{name}" type="float">')
+            for port, value in zip(inputs, values, strict=True):
+                lines.append(f'  <input name="{port}" type="float" {value} />')
+            lines.append(f"</{category}>")
+            return name
+
+        def source(node: Expression) -> str:
+            if node.is_number:
+                return f'value="{_plain(node.value)}"'
+            if node.operation == "variable":
+                return f'interfacename="{node.name}"'
+            return f'nodename="{written(node)}"'
+
+        return lines, [written(one) for one in _Steps(code.expressions).expressions]
+
+
+LANGUAGES: Registry[Language] = Registry("language")
 LANGUAGES.add("glsl", Syntax(inverse_root="inversesqrt({})"))
 LANGUAGES.add("hlsl", Syntax(inverse_root="rsqrt({})"))
+LANGUAGES.add(
+    "wgsl",
+    Syntax(
+        inverse_root="inverseSqrt({})",
+        select="select({3}, {2}, {0} < {1})",
+        head="fn {name}({arguments}) -> f32 {{",
+        argument="{}: f32",
+        declare="let {name} = {value}",
+    ),
+)
+LANGUAGES.add(
+    "metal",
+    Syntax(
+        inverse_root="rsqrt({})",
+        number=_single,
+        include="#include <metal_stdlib>\nusing namespace metal;",
+    ),
+)
+LANGUAGES.add("osl", Syntax(inverse_root="inversesqrt({})"))
 LANGUAGES.add(
     "c",
     Syntax(
         inverse_root="1.0f / sqrtf({})",
         root="sqrtf({})",
         clamp="fminf(fmaxf({}, {}), {})",
-        number=lambda value: f"{_plain(value)}f",
+        power="powf({}, {})",
+        minimum="fminf({}, {})",
+        maximum="fmaxf({}, {})",
+        log="logf({})",
+        number=_single,
         include="#include <math.h>",
     ),
 )
@@ -153,7 +324,14 @@ LANGUAGES.add(
         root="{} ** 0.5",
         # min and max of the language are for numbers alone.
         clamp="np.clip({}, {}, {})",
-        head="def {name}({argument}):",
+        power="{} ** {}",
+        minimum="np.minimum({}, {})",
+        maximum="np.maximum({}, {})",
+        log="np.log({})",
+        select="np.where({} < {}, {}, {})",
+        number=_double,
+        head="def {name}({arguments}):",
+        argument="{}",
         declare="{name} = {value}",
         end="",
         foot="",
@@ -161,6 +339,7 @@ LANGUAGES.add(
         comment="#",
     ),
 )
+LANGUAGES.add("materialx", MaterialX())
 LANGUAGES.add("latex", Latex())
 
 
@@ -171,7 +350,7 @@ def write_formula(formula: Formula, problem: SearchProblem, language: str) -> st
     ----------
     formula : Formula
         A formula for the problem.
-    problem : Problem
+    problem : SearchProblem
         Its pair, metric and range.
     language : str
         One of `LANGUAGES`.
@@ -181,147 +360,26 @@ def write_formula(formula: Formula, problem: SearchProblem, language: str) -> st
     MdfconvError
         If the language is not known.
     """
-    form = LANGUAGES[language]
-    comments = [f"{form.comment} {line}" for line in _facts(formula, problem)]
-    return "\n".join([*comments, *form.lines(formula, problem)])
+    return _written(fitted_code(formula, problem), LANGUAGES[language])
 
 
-def function_name(problem: SearchProblem) -> str:
-    """Return an identifier that says what is computed, and γ where it is not the usual one."""
-    ends = []
-    for end in (problem.target, problem.source):
-        owner, second = end.distribution, end.distribution.second_parameter
-        gamma = ""
-        if second and owner.gamma != second.default:
-            gamma = f" {second.name} {number_text(owner.gamma)}"
-        ends.append(f"{owner.name}{gamma} {end.stored.name}")
-    return _identifier(" from ".join(ends))
+def write_relation(relation: ExactRelation, language: str) -> str:
+    """Return an exact relation as code that can be pasted, with a comment that says so.
+
+    Parameters
+    ----------
+    relation : ExactRelation
+        Both ends, and how what the target stores follows from what the source stores.
+    language : str
+        One of `LANGUAGES`.
+
+    Raises
+    ------
+    MdfconvError
+        If the language is not known, or the relation is no formula.
+    """
+    return _written(exact_code(relation), LANGUAGES[language])
 
 
-def argument_name(name: str) -> str:
-    """Return a parameter's name as that of an argument, ``_value`` after what has a meaning."""
-    identifier = _identifier(name).lower()
-    plain = identifier not in _TAKEN and not any(map(str.isdigit, identifier))
-    return identifier if plain else f"{identifier}_value"
-
-
-def _identifier(text: str) -> str:
-    # In GLSL two underscores in a row are reserved.
-    words = re.findall("[A-Za-z0-9]+", _ascii(text))
-    return "_".join(words if words and words[0][0].isalpha() else ["f", *words])
-
-
-def _ascii(text: str, greek: str = "{}") -> str:
-    """Return a text with its Greek letters spelled, in a form such as ``<{}>``."""
-    return "".join(
-        letter if letter.isascii() else greek.format(unicodedata.name(letter).split()[-1].lower())
-        for letter in text
-    )
-
-
-def _facts(formula: Formula, problem: SearchProblem) -> list[str]:
-    """Return what a reader of the code must know, in ASCII."""
-    source, target = (_ascii(_end_text(end)) for end in (problem.source, problem.target))
-    metric = problem.metric
-    # A metric may be named after a file; a comment is one line.
-    named = "".join(letter if letter.isprintable() else "?" for letter in str(metric))
-    of = " of 1 - g" if is_glossy(problem.target) else ""
-    return [
-        f"{source} to {target}, for {number_text(problem.low)} to {number_text(problem.high)}; "
-        "outside, the input is clamped.",
-        f"Least squares under the {named} metric: keeps the {metric.keeps}.",
-        f"Worst relative error{of} {formula.error:.2g} in float32; {formula.shape.operations} "
-        "operations (+ - * count 1, clamp 2, / sqrt 1/sqrt 4).",
-        f"By mdfconv {__version__}.",
-    ]
-
-
-def _end_text(end: Endpoint) -> str:
-    owner, second = end.distribution, end.distribution.second_parameter
-    gamma = f" at {second.symbol} = {number_text(owner.gamma)}" if second else ""
-    return f"{end.label} {end.stored.symbol}{gamma}"
-
-
-def _body(formula: Formula, problem: SearchProblem, dialect: Syntax) -> tuple[dict[str, str], str]:
-    """Return the constants of the function and the expression of its result."""
-    shape = formula.shape
-    constants: dict[str, str] = {}
-    one = dialect.number(1.0)
-
-    def named(name: str, value: str) -> str:
-        constants[name] = value
-        return name
-
-    w = argument_name(problem.source.stored.name)
-    if not shape.is_constant:
-        clamped = dialect.clamp.format(w, dialect.number(problem.low), dialect.number(problem.high))
-        w = named("w", f"{one} - {clamped}" if is_glossy(problem.source) else clamped)
-    u = w
-    if shape.has_terms and shape.variable != 1:
-        u = named("u", _raised(w, shape.variable, dialect, named))
-    value = _horner(formula.numerator, u, dialect)
-    if shape.factor:
-        factor = u if shape.shares_factor else _raised(w, shape.factor, dialect, named)
-        value = f"{factor} * {_enclosed(value)}"
-    if formula.denominator:
-        down = _horner((1.0, *formula.denominator), u, dialect)
-        value = f"{_enclosed(value) if not shape.factor else value} / ({down})"
-    if shape.outer != 1:
-        value = _raised(named("v", value), shape.outer, dialect, named)
-    return constants, f"{one} - {_enclosed(value)}" if is_glossy(problem.target) else value
-
-
-def _enclosed(value: str) -> str:
-    return f"({value})" if " " in value else value
-
-
-def _raised(base: str, exponent: float, dialect: Syntax, named: Callable[[str, str], str]) -> str:
-    """Return the expression of a name raised to one of the family's powers."""
-    if exponent == 4:
-        square = named("w2", f"{base} * {base}")
-        return f"{square} * {square}"
-    if exponent == 2:
-        return f"{base} * {base}"
-    if exponent == 1:
-        return base
-    if abs(exponent) == 0.5:
-        return (dialect.root if exponent > 0 else dialect.inverse_root).format(base)
-    if abs(exponent) == 0.25:
-        return _raised(_enclosed(dialect.root.format(base)), 2 * exponent, dialect, named)
-    return f"{dialect.number(1.0)} / {_enclosed(_raised(base, -exponent, dialect, named))}"
-
-
-def _horner(coefficients: tuple[float, ...], u: str, dialect: Syntax) -> str:
-    value = dialect.number(coefficients[-1])
-    for coefficient in coefficients[-2::-1]:
-        value = f"{dialect.number(coefficient)} + {u} * {_enclosed(value)}"
-    return value
-
-
-def _latex_symbol(end: Endpoint) -> str:
-    head, _, tail = _ascii(end.stored.symbol, r"\{}").partition("_")
-    return f"{head}_{{{tail}}}" if tail else head
-
-
-def _latex_number(value: float) -> str:
-    head, _, tail = _plain(value).partition("e")
-    return rf"{head} \cdot 10^{{{int(tail)}}}" if tail else head
-
-
-def _latex_polynomial(coefficients: tuple[float, ...], base: str, exponent: float) -> str:
-    text = ""
-    for index, coefficient in enumerate(coefficients):
-        number = _latex_number(abs(coefficient))
-        sign = "-" if coefficient < 0 else "+"
-        factor = rf" {_latex_power(base, index * exponent)}" if index else ""
-        text += f" {sign} {number}{factor}" if text else f"{'-' * (sign == '-')}{number}{factor}"
-    return text
-
-
-def _latex_power(base: str, exponent: float) -> str:
-    return base if exponent == 1 else f"{base}^{{{_exponent(exponent)}}}"
-
-
-def _exponent(value: float) -> str:
-    top, bottom = value.as_integer_ratio()
-    return f"{top}/{bottom}" if bottom > 1 else f"{top}"
+def _written(code: Code, language: Language) -> str:
+    return "\n".join([*map(language.remark, code.facts), *language.lines(code)])

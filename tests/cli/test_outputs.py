@@ -87,6 +87,9 @@ CASES = {
         {"--output": "fit.csv", "--png": "fit.png", "--report": "fit.html"},
         ("lobe.csv",),
     ),
+    "formula": Case(
+        ["formula", "--from", "ggx:glossiness", "--to", "ggx:roughness"], {"--output": "f.glsl"}
+    ),
     "fit-table": Case(["fit-table", "--m-b", "0.2"], {"--output": "table.csv"}),
     "plot-error": Case(
         ["plot-error", "--m-b", "0.2", "--mdf", "ggx", "--dpi", "10", "--points", "9"],

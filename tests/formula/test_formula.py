@@ -18,10 +18,12 @@ from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.fitting.solve import fit
 from mdfconv.formula import LANGUAGES, SearchProblem, cheapest, pareto_front, write_formula
+from mdfconv.formula.code import argument_name
 from mdfconv.formula.family import Formula, Shape
-from mdfconv.formula.languages import argument_name
 from mdfconv.formula.search import is_glossy
 from tests.cli.runner import run
+from tests.formula.latex import evaluated
+from tests.formula.running import RUN, with_naga
 
 # What the machine has: `.ci/run` installs both.
 COMPILERS = [name for name in ("gcc",) if shutil.which(name)]
@@ -149,6 +151,33 @@ def test_python_gives_the_nearest_end_outside_the_range(solved):
     assert math.isnan(function(math.nan))
 
 
+@pytest.mark.parametrize("language", [name for name in RUN if name not in ("c", "python")])
+def test_other_languages_compute_the_same(solved, wanted, language):
+    problem, formula, _ = solved
+    values = values_in(problem)
+    (got,) = RUN[language](write_formula(formula, problem, language), [values])
+    assert worst(problem, got, wanted) <= formula.error * 1.02 + 1e-6
+    beyond, ends = outside(problem)
+    (got,) = RUN[language](write_formula(formula, problem, language), [beyond])
+    (at_ends,) = RUN[language](write_formula(formula, problem, language), [ends])
+    np.testing.assert_array_equal(got, at_ends)
+
+
+def test_wgsl_computes_the_same():
+    """All at once, for the driver takes seconds to start."""
+    ends = [(endpoint(first), endpoint(last)) for first, last, *_ in CASES]
+    problems = [
+        SearchProblem(*pair, metric_named(case[2]), *case[3:5])
+        for pair, case in zip(ends, CASES, strict=True)
+    ]
+    formulas = [cheapest(problem, case[5]) for problem, case in zip(problems, CASES, strict=True)]
+    codes = [write_formula(*both, "wgsl") for both in zip(formulas, problems, strict=True)]
+    values = list(map(values_in, problems))
+    results = with_naga(codes, [[column] for column in values])
+    for problem, formula, column, (got,) in zip(problems, formulas, values, results, strict=True):
+        assert worst(problem, got, exact(problem, column)) <= formula.error * 1.02 + 1e-6
+
+
 @pytest.mark.parametrize("validator", VALIDATORS)
 def test_shaders_validate(solved, tmp_path, validator):
     problem, formula, _ = solved
@@ -182,6 +211,13 @@ def test_latex_says_the_same(solved):
     condition = re.sub(r" \\cdot 10\^{(.*?)}", r"e\1", text.partition(r"\quad ")[2])
     low, _, high = condition.split(r" \le ")
     assert (float(low), float(high)) == (problem.low, problem.high)
+
+
+def test_latex_computes_the_same(solved, wanted):
+    problem, formula, _ = solved
+    line = write_formula(formula, problem, "latex").splitlines()[-1]
+    got = evaluated(line, {problem.source.stored.symbol: values_in(problem).astype(float)})
+    assert worst(problem, got, wanted) <= formula.error * 1.02 + 1e-6
 
 
 def test_the_comment_states_what_was_promised(solved):
@@ -234,20 +270,41 @@ def stored_as(name, **options):
     )
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["scale", "u", "v", "w", "w2", "sqrt", "clamp", "fminf", "np", "half", "lambda", "float",
+NAMES = [
+    "scale", "u", "v", "w", "w2", "sqrt", "clamp", "fminf", "np", "half", "lambda", "float",
      "float3", "sample", "in", "m_B", "mean slope", "α", "2nd", "input", "register", "row__major",
-     "Texture"],
-)  # fmt: skip
-def test_any_name_of_a_parameter_is_valid_code(name, tmp_path):
-    # Of all shapes the one that needs most names: 1 − w⁴ under a root.
+     "Texture", "t1", "kernel", "device", "thread", "closure", "color", "normal", "point",
+     "emit", "fn", "let", "var", "loop", "self", "target", "mod", "ref", "macro", "super",
+     "override", "enable", "from", "await", "storage", "workgroup", "std", "handle", "move", "get",
+]  # fmt: skip
+# Of all shapes the one that needs most names: 1 − w⁴ under a root.
+MANY = Shape(variable=4.0, factor=1.0, outer=0.5, numerator=2, denominator=2)
+
+
+def with_many_names(name):
+    """Return a formula, what it is for, values of its argument and what it makes of them."""
     problem = SearchProblem(stored_as(name), endpoint("beckmann"), metric_named("unit"), 0.01, 0.8)
-    shape = Shape(variable=4.0, factor=1.0, outer=0.5, numerator=2, denominator=2)
-    formula = Formula(shape, (1.0, 0.5), (0.25, 0.125), 0.1)
     values = np.linspace(0.1, 0.8, 5)
     w4 = values**4
     wanted = np.sqrt(values * (1 + 0.5 * w4) / (1 + 0.25 * w4 + 0.125 * w4**2))
+    return Formula(MANY, (1.0, 0.5), (0.25, 0.125), 0.1), problem, values, wanted
+
+
+def test_any_name_of_a_parameter_is_valid_wgsl():
+    cases = list(map(with_many_names, NAMES))
+    codes = [write_formula(formula, problem, "wgsl") for formula, problem, *_ in cases]
+    for (*_, wanted), (got,) in zip(
+        cases, with_naga(codes, [[values] for *_, values, _ in cases]), strict=True
+    ):
+        np.testing.assert_allclose(got, wanted, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_any_name_of_a_parameter_is_valid_code(name, tmp_path):
+    formula, problem, values, wanted = with_many_names(name)
+    for language in ("metal", "osl", "materialx"):
+        (got,) = RUN[language](write_formula(formula, problem, language), [values])
+        np.testing.assert_allclose(got, wanted, rtol=1e-6)
     code = write_formula(formula, problem, "python")
     scope = {}
     exec(code, scope)
@@ -371,9 +428,23 @@ def test_command():
 ONE_LINE = {
     "glsl": "float w = clamp(exponent, 1.0, 10000.0); float v = {} + w * {}; return inversesqrt(v)",
     "hlsl": "float w = clamp(exponent, 1.0, 10000.0); float v = {} + w * {}; return rsqrt(v)",
+    "wgsl": "let w = clamp(exponent, 1.0, 10000.0); let v = {} + w * {}; return inverseSqrt(v)",
+    "metal": "float w = clamp(exponent, 1.0f, 10000.0f); float v = {}f + w * {}f; return rsqrt(v)",
+    "osl": "float w = clamp(exponent, 1.0, 10000.0); float v = {} + w * {}; return inversesqrt(v)",
     "c": "float w = fminf(fmaxf(exponent, 1.0f), 10000.0f); float v = {}f + w * {}f; "
     "return 1.0f / sqrtf(v)",
     "python": "w = np.clip(exponent, 1.0, 10000.0); v = {} + w * {}; return v ** -0.5",
+    "materialx": '<clamp name="w" type="float"> '
+    '<input name="in" type="float" interfacename="exponent" /> '
+    '<input name="low" type="float" value="1.0" /> '
+    '<input name="high" type="float" value="10000.0" /> </clamp> '
+    '<multiply name="multiply1" type="float"> <input name="in1" type="float" value="{1}" /> '
+    '<input name="in2" type="float" nodename="w" /> </multiply> '
+    '<add name="v" type="float"> <input name="in1" type="float" nodename="multiply1" /> '
+    '<input name="in2" type="float" value="{0}" /> </add> '
+    '<sqrt name="sqrt1" type="float"> <input name="in" type="float" nodename="v" /> </sqrt> '
+    '<divide name="divide1" type="float"> <input name="in1" type="float" value="1.0" /> '
+    '<input name="in2" type="float" nodename="sqrt1" /> </divide>',
     "latex": r"\alpha = \left({} + {} N\right)^{{-1/2}}",
 }
 

@@ -212,13 +212,18 @@ class Dialect:
             else:
                 low = max(low, clamp.limit / _SHORT_OF_CLAMP)
         # What cannot be stored is beyond the least number.
+        least, largest = self.stored.lower, self.stored.upper
         ends = sorted(
-            float(np.nan_to_num(self.encode(np.array(end), weight), nan=self.stored.lower))
+            float(
+                np.clip(
+                    np.nan_to_num(self.encode(np.array(end), weight), nan=least), least, largest
+                )
+            )
             for end in (low, high)
         )
         return Encoding(
             f"{self.name}:{setting}" if setting else self.name,
-            replace(self.stored, typical=(ends[0], min(ends[1], self.stored.upper))),
+            replace(self.stored, typical=(ends[0], ends[1])),
             lambda stored: self.decode(stored, weight),
             lambda value: self.encode(value, weight),
             self.formula,

@@ -15,8 +15,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mdfconv.distributions.dialects import DIALECTS
 from tests.formula import wgsl
 
+# What a rule needs besides the stored number.
+SETTINGS = {
+    dialect.name: f":{dialect.setting.example / 2:g}"
+    for dialect in DIALECTS
+    if dialect.setting and dialect.setting.default is None
+}
 # Of OSL (Language Specification) and of the Metal Shading Language, what is not in C++.
 SHIMS = {
     "osl": """

@@ -13,7 +13,6 @@ from matplotlib.mathtext import MathTextParser
 
 import mdfconv
 from mdfconv.distributions import list_distributions, one_parameter_distributions
-from mdfconv.distributions.dialects import DIALECTS, Specular
 from mdfconv.distributions.endpoint import Endpoint, encodings_of, endpoint, exact_route
 from mdfconv.distributions.parameter import Encoding, Parameter
 from mdfconv.errors import MdfconvError
@@ -26,6 +25,7 @@ from tests.formula.latex import evaluated
 from tests.formula.running import (
     PRECISION,
     RUN,
+    SETTINGS,
     SINGLE,
     VALIDATED,
     validated,
@@ -33,14 +33,13 @@ from tests.formula.running import (
     with_python,
 )
 
-NEED_SPECULAR = {dialect.name for dialect in DIALECTS if dialect.specular is Specular.needed}
 FORMS = [
     form
     for mdf in one_parameter_distributions()
     for form in (
         [mdf.name] if not encodings_of(mdf) or mdf.parameter.larger_is_smoother else []
     ) + [
-        f"{mdf.name}:{name}{':0.5' if name in NEED_SPECULAR else ''}" for name in encodings_of(mdf)
+        f"{mdf.name}:{name}{SETTINGS.get(name, '')}" for name in encodings_of(mdf)
     ]
 ]  # fmt: skip
 # All pairs of forms of the same lobe, those of two distributions as well.

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mdfconv.distributions import list_distributions, one_parameter_distributions
-from mdfconv.distributions.dialects import DIALECTS, Specular
+from mdfconv.distributions.dialects import DIALECTS
 from mdfconv.distributions.endpoint import Endpoint, encodings_of, endpoint, endpoints
 from mdfconv.distributions.parameter import Encoding, Parameter
 from mdfconv.errors import MdfconvError
@@ -23,7 +23,7 @@ from mdfconv.formula.family import Formula, Shape
 from mdfconv.formula.search import is_glossy
 from tests.cli.runner import run
 from tests.formula.latex import evaluated
-from tests.formula.running import RUN, with_naga
+from tests.formula.running import RUN, SETTINGS, with_naga
 
 # What the machine has: `.ci/run` installs both.
 COMPILERS = [name for name in ("gcc",) if shutil.which(name)]
@@ -493,9 +493,8 @@ def test_mistakes(words, message):
     assert len(err.splitlines()) == 1
 
 
-NEED_SPECULAR = {dialect.name for dialect in DIALECTS if dialect.specular is Specular.needed}
 FORMS = [
-    f"{mdf.name}:{form}{':0.5' if form in NEED_SPECULAR else ''}"
+    f"{mdf.name}:{form}{SETTINGS.get(form, '')}"
     for mdf in one_parameter_distributions()
     for form in encodings_of(mdf)
 ]
@@ -516,7 +515,7 @@ def test_every_form_is_a_source(name):
 
 
 CLAMPING_AT_0 = [
-    (f"{owner}:{dialect.name}{':0.5' if dialect.specular is Specular.needed else ''}")
+    f"{owner}:{dialect.name}{SETTINGS.get(dialect.name, '')}"
     for dialect in DIALECTS
     if any(clamp.stored == 0 for clamp in dialect.clamps)
     for owner in dialect.owners

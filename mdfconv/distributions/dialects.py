@@ -37,6 +37,8 @@ _GLOSSINESS = replace(_SMOOTHNESS, name="glossiness", symbol="g", upper_closed=F
 _ALPHA = replace(_ABOVE_ZERO, name="alpha", symbol="α")
 # The typical range of stored numbers ends so near to where they are clamped.
 _SHORT_OF_CLAMP = 0.9
+# And starts at no less than this share of its end where a larger number is smoother.
+_LEAST_SHARE = 0.001
 # Of textures that hold what the rule says of numbers.
 SAME = "same"
 
@@ -221,6 +223,9 @@ class Dialect:
             )
             for end in (low, high)
         )
+        if self.stored.larger_is_smoother:
+            # Ranges are searched by the logarithm.
+            ends[0] = max(ends[0], _LEAST_SHARE * ends[1])
         return Encoding(
             f"{self.name}:{setting}" if setting else self.name,
             replace(self.stored, typical=(ends[0], ends[1])),

@@ -276,5 +276,5 @@ def test_the_table_says_what_ns_was_taken_for(tmp_path):
     files = str(tmp_path / "a.mtl"), "-o", str(tmp_path / "b.mtl")
     status, text = run_on_terminal("mtl", *files, COLUMNS="80")
     assert status == 0
-    assert "blinn-phong:blender-2.8, environment" in " ".join(text.split())
+    assert "blinn-phong:blender-2.8," in text
     assert "written by Blender: Ns = 900 (1 − r)², as its numbers say" in " ".join(text.split())

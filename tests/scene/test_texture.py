@@ -24,10 +24,11 @@ RULES = [
     ("blinn-phong:exponent", "ggx:roughness"),
     ("ggx:roughness", "blinn-phong:log2"),
     ("blinn-phong:log2", "sawicki:exponent"),
+    ("blinn-phong:reflected-exponent", "ggx:roughness"),
     ("smoothie", "schlick"),
 ]
 # Whether the stored value falls as the surface gets rougher.
-FALLS = ("glossiness", "exponent", "log2")
+FALLS = ("glossiness", "exponent", "log2", "reflected-exponent")
 DTYPES = [np.uint8, np.uint16, np.float16, np.float32, np.float64]
 
 
@@ -153,6 +154,36 @@ def test_exponents():
     back = TextureRule("blinn-phong:log2", "blinn-phong:exponent", log2_scale=10, exponent_max=1024)
     assert convert_texture(texels, back) == pytest.approx(2 ** (10 * texels) / 1024)
     assert TextureRule("phong:exponent", "ggx").exponent_max == 1000  # MTL
+
+
+def test_exponents_with_an_offset():
+    # exp2(10 g + 1), as many shaders have it; 1 + 149 v, of the reflected ray, as Source has it.
+    texels = np.array([0, 64, 128, 255], np.uint8)
+    gloss = TextureRule("blinn-phong:log2", "ggx:roughness", log2_scale=10, log2_offset=1)
+    assert convert_texture(texels, gloss).tolist() == [201, 143, 94, 40]
+    v = np.array([0, 0.25, 1])
+    to = {"target": "blinn-phong:log2", "log2_scale": 12, "log2_offset": -1}
+    linear = TextureRule("blinn-phong:exponent", exponent_min=5, exponent_max=105, **to)
+    assert convert_texture(v, linear) == pytest.approx((np.log2(5 + 100 * v) + 1) / 12)
+    source = TextureRule("phong:reflected-exponent", exponent_min=1, exponent_max=150, **to)
+    exponent = 4 * (1 + 149 * v) + 3
+    assert convert_texture(v, source) == pytest.approx((np.log2(exponent) + 1) / 12)
+    number = mdfconv.convert(150.0, "blinn-phong:reflected", "ggx:roughness", metric="environment")
+    rough = TextureRule(source.source, "ggx:roughness", exponent_min=1, exponent_max=150)
+    assert convert_texture(v[2:], rough) == pytest.approx(number)
+
+
+@given(st.floats(0, 100), st.floats(1, 5000), st.sampled_from(["exponent", "reflected-exponent"]))
+@settings(max_examples=40, deadline=None)
+def test_offsets_go_back(low, width, form):
+    texels = np.linspace(0, 1, 33)[low == 0 :]
+    there = f"blinn-phong:{form}", "blinn-phong:log2"
+    ends = {"exponent_min": low, "exponent_max": low + width, "log2_offset": -1, "log2_scale": 20}
+    smooth = quiet(texels, TextureRule(*there, **ends))
+    back = quiet(smooth, TextureRule(*there[::-1], **ends))
+    # Below N = 1 half a level of log2 is clamped.
+    large = smooth > 0
+    assert back[large] == pytest.approx(texels[large], abs=1e-6 * (1 + low / width))
 
 
 @given(arrays.arrays(np.uint8, arrays.array_shapes(max_dims=3, max_side=20)))
@@ -298,7 +329,7 @@ def test_arrays_that_are_no_texture(array, options, words):
     ("rule", "words"),
     [
         (("blinn-phong", "ggx"), "blinn-phong:exponent or blinn-phong:log2"),
-        (("blinn-phong:roughness", "ggx"), "known: exponent, log2"),
+        (("blinn-phong:roughness", "ggx"), "known: exponent, log2, reflected-exponent"),
         (("ggx:log2", "ggx"), "encoding of ggx"),
         (("ggx", "ggy"), "did you mean"),
         (("gauss", "ggx", "ward"), "ward has no conversion"),
@@ -307,6 +338,13 @@ def test_arrays_that_are_no_texture(array, options, words):
         (("blinn-phong:exponent", "ggx", "fast", "unit", 0.0), "above 0"),
         (("blinn-phong:log2", "ggx", "fast", "unit", 1e3, np.inf), "log2"),
         (("ggx", "beckmann", "fast", "unit", 1e3, 13.0, 2.0), "neither ggx nor beckmann has a sec"),
+        (
+            ("blinn-phong:exponent", "ggx", None, "unit", 10.0, 1.0, None, 1.0, 10.0),
+            "below the lar",
+        ),
+        (("blinn-phong:exponent", "ggx", None, "unit", 10.0, 1.0, None, 1.0, -1.0), "from 0"),
+        (("phong:log2", "ggx", None, "unit", 10.0, 9.0, None, 1.0, 0.0, 992.0), "offset of log2"),
+        (("phong:log2", "ggx", None, "unit", 10.0, 9.0, None, 1.0, 0.0, np.nan), "offset of log2"),
         (("ggx", "student-t", "fast", "unit", 1e3, 13.0, 1.0), "student-t γ = 1"),
         ((3, "ggx"), "named by a string"),
     ],

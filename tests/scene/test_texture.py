@@ -12,6 +12,7 @@ from hypothesis.extra import numpy as arrays
 
 import mdfconv
 from mdfconv import MdfconvError, MdfconvWarning
+from mdfconv.distributions.endpoint import endpoint
 from mdfconv.scene import TextureRule, convert_texture
 from mdfconv.scene.texture import convert as texture_module
 from mdfconv.scene.texture.texel_map import ErrorDiffusion
@@ -357,6 +358,30 @@ def test_rules_that_are_none(rule, words):
 def test_docstring_example():
     found = doctest.testmod(texture_module)
     assert (found.failed, found.attempted > 0) == (0, True)
+
+
+@pytest.mark.parametrize("name", ["blinn-phong:blender-obj", "blinn-phong:blender-2.8"])
+def test_texels_follow_the_rule_that_a_program_has_for_textures(name):
+    """Blender has the picture of a roughness socket as map_Ns, where its numbers are exponents."""
+    texels = levels(np.uint8)
+    rule = TextureRule(name, "ggx:alpha")
+    assert rule.endpoints()[0].label == "ggx:roughness"
+    expected = np.rint(np.square(texels / 255) * 255)
+    assert np.array_equal(convert_texture(texels, rule), expected)
+    there, back = TextureRule("ggx:alpha", name), TextureRule("ggx:alpha", "ggx:roughness")
+    assert np.array_equal(convert_texture(texels, there), convert_texture(texels, back))
+
+
+@pytest.mark.parametrize("name", ["blinn-phong:obj2gltf", "blinn-phong:fbx", "phong:linear:128"])
+def test_texels_that_are_not_known_are_refused(name):
+    for pair in ((name, "ggx"), ("ggx", name)):
+        with pytest.raises(MdfconvError, match=r"texels of .* are is not known") as caught:
+            TextureRule(*pair).endpoints()
+        for meant in ("ggx:glossiness", "blinn-phong:exponent", "ggx:roughness"):
+            assert meant in caught.value.hint
+            TextureRule(meant, "ggx").endpoints()
+    # Who has looked it up says so.
+    assert TextureRule(endpoint(name), "ggx").endpoints()[0].label == endpoint(name).label
 
 
 def test_what_is_too_rough_for_the_target_is_the_roughest():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.base import same
 from mdfconv.distributions.dialects import dialects_of
-from mdfconv.distributions.endpoint import Endpoint, endpoint, endpoints
+from mdfconv.distributions.endpoint import Endpoint, endpoint, endpoints, texels_of
 from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.distributions.parameter import ROUGHNESS, Encoding, Parameter
 from mdfconv.errors import MdfconvError
@@ -41,7 +41,9 @@ class TextureRule:
         `exponent_min` and `exponent_max`, and a, k for `log2_offset` and `log2_scale`,
         ``"blinn-phong:exponent"`` has N = A + (B − A) v, ``"blinn-phong:log2"`` N = 2^(a + k v)
         and ``"blinn-phong:reflected-exponent"`` the exponent n = A + (B − A) v of the reflected
-        ray, whose N is that of ``"blinn-phong:reflected"``.
+        ray, whose N is that of ``"blinn-phong:reflected"``. The name of a program's rule, such as
+        ``"blinn-phong:blender-obj"``, stands for what the program has in textures, which may be
+        another form; an `Endpoint` is what the texels are.
     method : str, optional
         As for `mdfconv.convert`: the fit under the metric if not given, as textures use the
         whole range, on which the closed forms turn around or turn negative.
@@ -83,8 +85,8 @@ class TextureRule:
         ------
         MdfconvError
             If a name is not known or does not say how a texture stores the parameter, if an
-            end of the exponents, a constant of log2, the factor or γ is out of its range, or if
-            γ is none of either's.
+            end of the exponents, a constant of log2, the factor or γ is out of its range, if γ
+            is none of either's, or if it is not known what a program has in textures.
         """
         if not 0 < self.exponent_max < np.inf:
             raise MdfconvError(f"the largest exponent is above 0, not {self.exponent_max:g}")
@@ -109,8 +111,20 @@ class TextureRule:
         return endpoints(self._endpoint(self.source), self._endpoint(self.target), self.gamma)
 
     def _endpoint(self, name: str | Endpoint) -> Endpoint:
+        """Return what the texels are, of a program that stores numbers by a rule what it has."""
         if not isinstance(name, str):
             return endpoint(name)  # which says what a name is
+        end = self._named(name)
+        texels = texels_of(end)
+        if not texels:
+            raise MdfconvError(
+                f"what the texels of {end.label} are is not known: programs copy textures as they "
+                "are, or have another rule for them than for numbers",
+                "say what they are, such as ggx:glossiness, blinn-phong:exponent or ggx:roughness",
+            )
+        return end if texels == end.label else self._named(texels)
+
+    def _named(self, name: str) -> Endpoint:
         head, colon, tail = name.partition(":")
         owner = distribution(head)
         # What a texture stores is at most 1.

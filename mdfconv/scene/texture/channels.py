@@ -163,8 +163,10 @@ class ChannelMove:
     def __str__(self) -> str:
         if len(self._chosen.layout.names) == len(self.layout.names) == 1:
             return ""
-        moved = self._moved and self._chosen.names != self._target.names
-        return f"{self._target} from {self._chosen}" if moved else str(self._target)
+        if not self._moved or self._chosen.names == self._target.names:
+            return str(self._target)
+        stays = self._base is self._source and set(self._chosen.names) <= set(self.layout.names)
+        return f"{self._target} from {self._chosen}{' (which stays as it is)' if stays else ''}"
 
     @property
     def depth(self) -> int | None:

@@ -100,6 +100,19 @@ def _form_named(path: Path) -> PictureForm | None:
     return next((form for form in _FORMS if path.suffix.lower() in form.endings), None)
 
 
+def pictures_in(folder: Path) -> list[Path]:
+    """Return the files of a folder that are pictures by their names, in alphabetical order."""
+    pictures = [path for path in sorted(folder.iterdir()) if _form_named(path) and path.is_file()]
+    if not pictures:
+        raise MdfconvError(f"{folder} has no file that is a PNG, TIFF, TGA or OpenEXR by its name")
+    return pictures
+
+
+def result_name(path: Path) -> Path:
+    """Return a name of the same stem whose form a texture may have: for a JPEG that of a PNG."""
+    return path.with_suffix(PNG.endings[0]) if _form_named(path) is JPEG else path
+
+
 @dataclass(frozen=True)
 class PictureFile:
     """A file, and what messages call it."""

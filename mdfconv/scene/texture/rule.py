@@ -127,10 +127,9 @@ class TextureRule:
     def _named(self, name: str) -> Endpoint:
         head, colon, tail = name.partition(":")
         owner = distribution(head)
-        # What a texture stores is at most 1.
-        if owner.parameter.typical[1] <= 1:
+        known = {encoding.name: encoding for encoding in self.encodings(owner)}
+        if not known:
             return endpoint(name)
-        known = {encoding.name: encoding for encoding in self._encodings(owner)}
         if not colon:
             choices = " or ".join(f"{owner.name}:{encoding}" for encoding in known)
             raise MdfconvError(f"a texture of {owner.name} needs an encoding", choices)
@@ -142,9 +141,12 @@ class TextureRule:
             return endpoint(name)
         raise unknown_name(f"encoding of {owner.name} in a texture", tail, [*known, *dialects])
 
-    def _encodings(self, owner: Distribution) -> list[Encoding]:
-        """Return how a texture stores a parameter that scenes use beyond 1."""
+    def encodings(self, owner: Distribution) -> list[Encoding]:
+        """Return how a texture stores a parameter that scenes use beyond 1; nothing of others."""
         parameter = owner.parameter
+        # What a texture stores is at most 1.
+        if parameter.typical[1] <= 1:
+            return []
         # The parameter in another form, such as the exponent of the reflected ray.
         others = [
             self._between(form.stored, f"{form.name}-exponent", form) for form in owner.encodings

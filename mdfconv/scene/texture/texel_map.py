@@ -252,7 +252,9 @@ class TexelMap:
             if self._dither:
                 converted = self._dither[channel](converted)
         else:
-            values, outcomes = self._convert(texels.astype(np.float64))
+            with np.errstate(invalid="ignore"):  # NaN that signals is NaN, too
+                doubles = texels.astype(np.float64)
+            values, outcomes = self._convert(doubles)
             converted = self._stored(values)
             self._outcomes += np.bincount(outcomes.ravel(), minlength=len(Outcome))
             self._before += _histogram(texels)

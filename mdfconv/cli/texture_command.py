@@ -105,16 +105,16 @@ def command(
 
     mdfconv texture gloss.png -o rough.png --from blinn-phong:exponent --to ggx:roughness
 
-    mdfconv texture unity.png -o orm.png --channel a --to-channel g --from ggx:glossiness
-    --to ggx:roughness
+    mdfconv texture u.png -o orm.png --channel a --to-channel g --from ggx:glossiness
+    --to ggx:roughness (the metallic-smoothness map of Unity to that of glTF)
 
-    mdfconv texture gloss.png -o new.png --into orm.png --to-channel g --from ggx:glossiness
-    --to ggx:roughness
+    mdfconv texture g.png -o new.png --into orm.png --to-channel g --from ggx:glossiness
+    --to ggx:roughness (a map of glossiness to the green channel of another picture)
 
     mdfconv texture orm.png -o new.png --channel g --from ggx:roughness --to ggx:alpha --depth 8
 
     mdfconv texture 'maps/*.png' -o out/ --from blinn-phong:log2 --log2-scale 10 --log2-offset 1
-    --to ggx:roughness
+    --to ggx:roughness (N = 2^(10 v + 1))
     """
     from mdfconv.distributions.endpoint import with_specular
     from mdfconv.scene.material_files import is_folder
@@ -199,16 +199,18 @@ def _converted(
     if len(files) == 1:
         return [work(files[0], results[0], fill=fill, progress=tables.progress)]
     reports = []
-    with tables.progress("textures", len(files)) as advance, _pool(len(files)) as pool:
+    with _pool(len(files)) as pool:
         with _signals_wait():
             begun = [
                 pool.submit(work, file, result, fill=partial(_chosen, fill(result)))
                 for file, result in zip(files, results, strict=True)
             ]
-        # What cannot be written is named by the one that is at work.
-        for staged.current, texture in zip(results, begun, strict=True):
-            reports.append(texture.result())
-            advance(1)
+        # The bar has a thread, of which a fork would know nothing.
+        with tables.progress("textures", len(files)) as advance:
+            # What cannot be written is named by the one that is at work.
+            for staged.current, texture in zip(results, begun, strict=True):
+                reports.append(texture.result())
+                advance(1)
     return reports
 
 

@@ -153,9 +153,21 @@ def test_a_tag_behind_the_texels_of_a_png_is_kept(tmp_path):
     chunk = content[33 : 33 + 12 + len(exif(8))]
     whole = content.replace(chunk, b"").replace(content[-12:], chunk + content[-12:])
     (tmp_path / "a.png").write_bytes(whole)
-    convert_texture_file(tmp_path / "a.png", tmp_path / "b.png", RULE)
+    for name in ("b.png", "b.tif"):
+        convert_texture_file(tmp_path / "a.png", tmp_path / name, RULE)
+        expected = convert_texture(texels[..., 0], RULE)
+        assert np.array_equal(read(tmp_path / name)[..., 0], expected)
+        assert orientation_of(tmp_path / name) == 8
     assert (b"eXIf", exif(8)) in png_chunks(tmp_path / "b.png")
-    assert np.array_equal(read(tmp_path / "b.png")[..., 0], convert_texture(texels[..., 0], RULE))
+
+
+@pytest.mark.parametrize("data", [b"", b"MM", b"II*\0\xff\xff\xff\xff", exif(6)[:20]])
+def test_exif_that_says_nothing_is_kept(tmp_path, data):
+    source = write_png(tmp_path / "a.png", samples(9, 5, 1, np.uint8), more=[(b"eXIf", data)])
+    for name in ("b.png", "b.tif"):
+        convert_texture_file(source, tmp_path / name, RULE)
+    assert orientation_of(tmp_path / "b.tif") == 1
+    assert png_chunks(tmp_path / "b.png")[1] == (b"eXIf", data)
 
 
 def test_texels_and_the_tag_of_a_jpeg_stay(tmp_path):
@@ -357,6 +369,30 @@ def test_every_half_is_kept_in_windows_tiles_and_any_order(tmp_path, monkeypatch
         assert written.pop("lineOrder") == str(OpenEXR.INCREASING_Y)
         assert given.pop("lineOrder") == str(header.get("lineOrder", OpenEXR.INCREASING_Y))
         assert written == given
+
+
+@pytest.mark.parametrize(
+    ("name", "lossy"),
+    [
+        ("PXR24", {"float32"}),
+        *((f"B44{letter}", {"float16"}) for letter in ("", "A")),
+        *((f"DWA{letter}", {"float16", "float32"}) for letter in "AB"),
+        *((name, set()) for name in ("NO", "RLE", "ZIP", "ZIPS", "PIZ")),
+    ],
+)
+def test_losses_of_exr_are_accepted_if_at_all(tmp_path, name, lossy):
+    for dtype in ("float16", "float32"):
+        y, x = np.mgrid[:40, :40]
+        texels = (0.5 + 0.4 * np.sin(x / 3) * np.cos(y / 5)).astype(dtype)
+        compression = getattr(OpenEXR, f"{name}_COMPRESSION")
+        source = write_exr(tmp_path / "a.exr", compression, G=texels)
+        # What a decoder gives back is what it got, or it is called lossy.
+        assert np.array_equal(read_exr(source)["G"], texels) == (dtype not in lossy)
+        if dtype in lossy:
+            with pytest.raises(MdfconvError, match="with losses") as caught:
+                convert_texture_file(source, tmp_path / "b.exr", RULE)
+            assert (caught.value.argument, name.lower() in str(caught.value)) == ("lossy", True)
+        convert_texture_file(source, tmp_path / "b.exr", RULE, lossy=dtype in lossy)
 
 
 def test_exr_with_losses_is_written_without(tmp_path):

@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 import struct
 import zlib
+from contextlib import suppress
+from io import BytesIO
 from math import ceil
 from pathlib import Path
+from typing import BinaryIO
 
 # Why a file is no texture, and what helps.
 Reason = tuple[str, str]
@@ -83,6 +86,18 @@ class PngHeader:
         """Whether it has EXIF, in whichever form."""
         return bool(self._exif)
 
+    @property
+    def orientation(self) -> int:
+        """What the chunk of EXIF says, also behind the texels; 1 if it says nothing.
+
+        OpenImageIO reads those before the texels, and texts.
+        """
+        for name, data in self._exif:
+            if name == _EXIF:
+                with suppress(struct.error):
+                    return int(_tiff_tags(BytesIO(data), len(data)).get(_ORIENTATION, (1,))[0])
+        return 1
+
     def gamma(self) -> str:
         """Return what the file says of a gamma, in words; empty if it says none."""
         if b"sRGB" in self._chunks:
@@ -151,7 +166,8 @@ def tiff_reason(path: Path) -> Reason | None:
     if they do, or if the directory is damaged.
     """
     try:
-        tags = _tiff_tags(path)
+        with path.open("rb") as file:
+            tags = _tiff_tags(file, path.stat().st_size)
     except struct.error:
         raise ValueError("its directory does not add up") from None
     bits: tuple[int, ...] = tags.get(_BITS, (1,))
@@ -190,29 +206,27 @@ def _lacks(tags: dict[int, tuple[int, ...]], bits: int, size: int) -> bool:
     return any(length < fewest for length, fewest in zip(lengths, least, strict=True))
 
 
-def _tiff_tags(path: Path) -> dict[int, tuple[int, ...]]:
+def _tiff_tags(file: BinaryIO, size: int) -> dict[int, tuple[int, ...]]:
     """Return the tags of whole numbers of a TIFF's or a BigTIFF's first picture."""
-    size = path.stat().st_size
-    with path.open("rb") as file:
-        start = file.read(16)
-        order = "<" if start[:2] == b"II" else ">"
-        big = struct.unpack(f"{order}H", start[2:4]) == (43,)
-        place, number, entry = ("Q", "Q", "HHQ8s") if big else ("I", "H", "HHI4s")
-        inline = 8 if big else 4
-        (offset,) = struct.unpack_from(order + place, start, inline)
-        file.seek(offset)
-        (count,) = struct.unpack(order + number, file.read(struct.calcsize(order + number)))
-        entries = file.read(count * struct.calcsize(order + entry))
-        tags: dict[int, tuple[int, ...]] = {}
-        for tag, kind, number_of, value in struct.iter_unpack(order + entry, entries):
-            if kind not in _WHOLE_NUMBERS:
-                continue
-            numbers = f"{order}{number_of}{_WHOLE_NUMBERS[kind]}"
-            length = struct.calcsize(numbers)
-            if length > inline:
-                file.seek(struct.unpack(order + place, value)[0])
-                value = file.read(min(length, size))
-            tags[tag] = struct.unpack(numbers, value[:length])
+    start = file.read(16)
+    order = "<" if start[:2] == b"II" else ">"
+    big = struct.unpack(f"{order}H", start[2:4]) == (43,)
+    place, number, entry = ("Q", "Q", "HHQ8s") if big else ("I", "H", "HHI4s")
+    inline = 8 if big else 4
+    (offset,) = struct.unpack_from(order + place, start, inline)
+    file.seek(offset)
+    (count,) = struct.unpack(order + number, file.read(struct.calcsize(order + number)))
+    entries = file.read(count * struct.calcsize(order + entry))
+    tags: dict[int, tuple[int, ...]] = {}
+    for tag, kind, number_of, value in struct.iter_unpack(order + entry, entries):
+        if kind not in _WHOLE_NUMBERS:
+            continue
+        numbers = f"{order}{number_of}{_WHOLE_NUMBERS[kind]}"
+        length = struct.calcsize(numbers)
+        if length > inline:
+            file.seek(struct.unpack(order + place, value)[0])
+            value = file.read(min(length, size))
+        tags[tag] = struct.unpack(numbers, value[:length])
     return tags
 
 

@@ -192,7 +192,8 @@ class Picture:
     @property
     def orientation(self) -> int:
         """By which of EXIF's numbers it is to be turned for the eye: 1 for not at all."""
-        return int(self.spec.get_int_attribute("Orientation", 1))
+        tag = int(self.spec.get_int_attribute("Orientation", 1))
+        return PngHeader(self.source.path).orientation if self.form is PNG and tag == 1 else tag
 
     def dtype_of(self, channels: Sequence[int]) -> np.dtype[Any]:
         """Return the type of the texels of some channels of the file, which must have the same."""

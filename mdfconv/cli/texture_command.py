@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -17,6 +18,7 @@ import typer
 from mdfconv.cli import completion, options, process, tables
 from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.outputs import Outputs, new_folder
+from mdfconv.errors import MdfconvError
 
 if TYPE_CHECKING:
     from mdfconv.output.files import StagedFiles
@@ -134,8 +136,15 @@ def command(
     outputs = Outputs(*(() if dry_run else (*results, png)), force=force, inputs=inputs)
     ends, fixed = with_specular(source, target, specular), options.fixed_gamma(gamma)
     rule = TextureRule(
-        *(*ends, method, str(chosen), exponent_max, log2_scale, fixed),
-        *(factor, exponent_min, log2_offset),
+        *ends,
+        method,
+        str(chosen),
+        exponent_max=exponent_max,
+        exponent_min=exponent_min,
+        log2_scale=log2_scale,
+        log2_offset=log2_offset,
+        gamma=fixed,
+        factor=factor,
     )
     work = partial(
         convert_texture_file,
@@ -220,6 +229,11 @@ def _pool(most: int) -> Iterator[ProcessPoolExecutor]:
     pool = ProcessPoolExecutor(min(most, os.cpu_count() or 1), initializer=_end_by_signals)
     try:
         yield pool
+    except BrokenProcessPool:
+        raise MdfconvError(
+            "a process that converts textures was ended from outside, perhaps for want of memory",
+            "convert fewer or smaller ones at once",
+        ) from None
     finally:
         pool.shutdown(cancel_futures=True)
 

@@ -15,7 +15,7 @@ from mdfconv import MdfconvError, MdfconvWarning
 from mdfconv.distributions.endpoint import endpoint
 from mdfconv.scene import TextureRule, convert_texture
 from mdfconv.scene.texture import convert as texture_module
-from mdfconv.scene.texture.texel_map import ErrorDiffusion
+from mdfconv.scene.texture.texel_map import ErrorDiffusion, TexelMap
 
 RULES = [
     ("ggx:alpha", "ggx:roughness"),
@@ -358,6 +358,33 @@ def test_rules_that_are_none(rule, words):
 def test_docstring_example():
     found = doctest.testmod(texture_module)
     assert (found.failed, found.attempted > 0) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("texels", "depth", "levels", "words"),
+    [
+        # n²/255 is 0 for all to 8 bits, and n² to 16.
+        (np.arange(8, dtype=np.uint8), None, (1, 8), "1 of 8 levels remain"),
+        (np.arange(8, dtype=np.uint8).repeat(9), None, (1, 8), "1 of 8 levels remain"),
+        (np.arange(8, dtype=np.uint8), 16, (0, 0), ""),
+        (np.array([100, 150, 200, 250], np.uint8), None, (4, 4), ""),
+        (np.arange(8192, dtype=np.uint16), 8, (5, 256), "5 of 256 levels remain"),
+        (np.arange(65536, dtype=np.uint16), 8, (256, 256), ""),
+        (np.linspace(0, 0.1, 99, dtype=np.float32), None, (0, 0), ""),
+    ],
+)
+def test_levels_that_8_bits_lose_are_counted(texels, depth, levels, words):
+    convert = TexelMap(TextureRule("ggx:roughness", "ggx:alpha"), texels.dtype, depth)
+    convert(texels)
+    assert convert.report().levels == levels
+    assert convert.report().lost_levels() == words
+
+
+def test_a_nan_that_signals_is_one():
+    texels = np.array([0x7F800001, 0x3F000000], np.uint32).view(np.float32)
+    found = quiet(texels, TextureRule("ggx:roughness", "ggx:alpha"))
+    assert np.isnan(found[0])
+    assert found[1] == 0.25
 
 
 @pytest.mark.parametrize("name", ["blinn-phong:blender-obj", "blinn-phong:blender-2.8"])

@@ -14,8 +14,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 
 _COLON = ":"
-# How a texture stores what is beyond 1, besides as programs do.
-_TEXELS_OF_EXPONENTS = ("exponent", "log2")
 
 
 def _names(place: str) -> Callable[[], list[str]]:
@@ -75,10 +73,17 @@ def targets(incomplete: str) -> list[str]:
 def texels(incomplete: str) -> list[str]:
     """Return what the texels of a texture can be."""
     from mdfconv.distributions import list_distributions
+    from mdfconv.scene.texture.rule import TextureRule
 
-    exponents = [mdf.name for mdf in list_distributions() if mdf.parameter.typical[1] > 1]
-    stored = [f"{name}{_COLON}{word}" for name in exponents for word in _TEXELS_OF_EXPONENTS]
-    return [*endpoints(incomplete), *stored]
+    encodings = TextureRule("", "").encodings
+    return [
+        *endpoints(incomplete),
+        *(
+            f"{mdf.name}{_COLON}{each.name}"
+            for mdf in list_distributions()
+            for each in encodings(mdf)
+        ),
+    ]
 
 
 def library_sources() -> list[str]:

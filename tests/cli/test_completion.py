@@ -35,7 +35,7 @@ FREE = {
     "convert": {"--gamma"},
     "recommend": {"--gamma"},
     "formula": {"--gamma", "--range"},
-    "texture": {"--gamma", "--channel"},
+    "texture": {"--gamma", "--channel", "--to-channel", "--output"},
     "fit-table": {"--sweep"},
 }
 
@@ -82,6 +82,7 @@ def completed(words, number):
         (["mitsuba", "--to", "b"], 3, ["beckmann"]),
         (["gltf", "--from", "blinn-phong", ":", "obj2"], 5, ["obj2gltf"]),
         (["texture", "--from", "blinn-phong", ":", "lo"], 5, ["log2"]),
+        (["texture", "--from", "blinn-phong", ":", "ref"], 5, ["reflected", "reflected-exponent"]),
         (["convert", "--to", "konvert", ":", "l"], 5, []),
     ],
 )
@@ -95,7 +96,7 @@ def test_every_encoding_is_offered(mdf):
     offered = completion.endpoints(f"{mdf.name}:")
     assert offered == [f"{mdf.name}:{name}" for name in encodings_of(mdf)]
     for name in completion.texels(f"{mdf.name}:"):
-        if name.startswith(f"{mdf.name}:") and "log2" in name:
+        if name.startswith(f"{mdf.name}:") and name.endswith(("log2", "exponent")):
             assert TextureRule(name, name).endpoints()[0].label == name
 
 

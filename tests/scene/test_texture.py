@@ -12,9 +12,10 @@ from hypothesis.extra import numpy as arrays
 
 import mdfconv
 from mdfconv import MdfconvError, MdfconvWarning
+from mdfconv.distributions.endpoint import endpoint
 from mdfconv.scene import TextureRule, convert_texture
 from mdfconv.scene.texture import convert as texture_module
-from mdfconv.scene.texture.texel_map import ErrorDiffusion
+from mdfconv.scene.texture.texel_map import ErrorDiffusion, TexelMap
 
 RULES = [
     ("ggx:alpha", "ggx:roughness"),
@@ -24,10 +25,11 @@ RULES = [
     ("blinn-phong:exponent", "ggx:roughness"),
     ("ggx:roughness", "blinn-phong:log2"),
     ("blinn-phong:log2", "sawicki:exponent"),
+    ("blinn-phong:reflected-exponent", "ggx:roughness"),
     ("smoothie", "schlick"),
 ]
 # Whether the stored value falls as the surface gets rougher.
-FALLS = ("glossiness", "exponent", "log2")
+FALLS = ("glossiness", "exponent", "log2", "reflected-exponent")
 DTYPES = [np.uint8, np.uint16, np.float16, np.float32, np.float64]
 
 
@@ -153,6 +155,36 @@ def test_exponents():
     back = TextureRule("blinn-phong:log2", "blinn-phong:exponent", log2_scale=10, exponent_max=1024)
     assert convert_texture(texels, back) == pytest.approx(2 ** (10 * texels) / 1024)
     assert TextureRule("phong:exponent", "ggx").exponent_max == 1000  # MTL
+
+
+def test_exponents_with_an_offset():
+    # exp2(10 g + 1), as many shaders have it; 1 + 149 v, of the reflected ray, as Source has it.
+    texels = np.array([0, 64, 128, 255], np.uint8)
+    gloss = TextureRule("blinn-phong:log2", "ggx:roughness", log2_scale=10, log2_offset=1)
+    assert convert_texture(texels, gloss).tolist() == [201, 143, 94, 40]
+    v = np.array([0, 0.25, 1])
+    to = {"target": "blinn-phong:log2", "log2_scale": 12, "log2_offset": -1}
+    linear = TextureRule("blinn-phong:exponent", exponent_min=5, exponent_max=105, **to)
+    assert convert_texture(v, linear) == pytest.approx((np.log2(5 + 100 * v) + 1) / 12)
+    source = TextureRule("phong:reflected-exponent", exponent_min=1, exponent_max=150, **to)
+    exponent = 4 * (1 + 149 * v) + 3
+    assert convert_texture(v, source) == pytest.approx((np.log2(exponent) + 1) / 12)
+    number = mdfconv.convert(150.0, "blinn-phong:reflected", "ggx:roughness", metric="environment")
+    rough = TextureRule(source.source, "ggx:roughness", exponent_min=1, exponent_max=150)
+    assert convert_texture(v[2:], rough) == pytest.approx(number)
+
+
+@given(st.floats(0, 100), st.floats(1, 5000), st.sampled_from(["exponent", "reflected-exponent"]))
+@settings(max_examples=40, deadline=None)
+def test_offsets_go_back(low, width, form):
+    texels = np.linspace(0, 1, 33)[low == 0 :]
+    there = f"blinn-phong:{form}", "blinn-phong:log2"
+    ends = {"exponent_min": low, "exponent_max": low + width, "log2_offset": -1, "log2_scale": 20}
+    smooth = quiet(texels, TextureRule(*there, **ends))
+    back = quiet(smooth, TextureRule(*there[::-1], **ends))
+    # Below N = 1 half a level of log2 is clamped.
+    large = smooth > 0
+    assert back[large] == pytest.approx(texels[large], abs=1e-6 * (1 + low / width))
 
 
 @given(arrays.arrays(np.uint8, arrays.array_shapes(max_dims=3, max_side=20)))
@@ -298,7 +330,7 @@ def test_arrays_that_are_no_texture(array, options, words):
     ("rule", "words"),
     [
         (("blinn-phong", "ggx"), "blinn-phong:exponent or blinn-phong:log2"),
-        (("blinn-phong:roughness", "ggx"), "known: exponent, log2"),
+        (("blinn-phong:roughness", "ggx"), "known: exponent, log2, reflected-exponent"),
         (("ggx:log2", "ggx"), "encoding of ggx"),
         (("ggx", "ggy"), "did you mean"),
         (("gauss", "ggx", "ward"), "ward has no conversion"),
@@ -307,6 +339,13 @@ def test_arrays_that_are_no_texture(array, options, words):
         (("blinn-phong:exponent", "ggx", "fast", "unit", 0.0), "above 0"),
         (("blinn-phong:log2", "ggx", "fast", "unit", 1e3, np.inf), "log2"),
         (("ggx", "beckmann", "fast", "unit", 1e3, 13.0, 2.0), "neither ggx nor beckmann has a sec"),
+        (
+            ("blinn-phong:exponent", "ggx", None, "unit", 10.0, 1.0, None, 1.0, 10.0),
+            "below the lar",
+        ),
+        (("blinn-phong:exponent", "ggx", None, "unit", 10.0, 1.0, None, 1.0, -1.0), "from 0"),
+        (("phong:log2", "ggx", None, "unit", 10.0, 9.0, None, 1.0, 0.0, 992.0), "offset of log2"),
+        (("phong:log2", "ggx", None, "unit", 10.0, 9.0, None, 1.0, 0.0, np.nan), "offset of log2"),
         (("ggx", "student-t", "fast", "unit", 1e3, 13.0, 1.0), "student-t γ = 1"),
         ((3, "ggx"), "named by a string"),
     ],
@@ -319,6 +358,57 @@ def test_rules_that_are_none(rule, words):
 def test_docstring_example():
     found = doctest.testmod(texture_module)
     assert (found.failed, found.attempted > 0) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("texels", "depth", "levels", "words"),
+    [
+        # n²/255 is 0 for all to 8 bits, and n² to 16.
+        (np.arange(8, dtype=np.uint8), None, (1, 8), "1 of 8 levels remain"),
+        (np.arange(8, dtype=np.uint8).repeat(9), None, (1, 8), "1 of 8 levels remain"),
+        (np.arange(8, dtype=np.uint8), 16, (0, 0), ""),
+        (np.array([100, 150, 200, 250], np.uint8), None, (4, 4), ""),
+        (np.arange(8192, dtype=np.uint16), 8, (5, 256), "5 of 256 levels remain"),
+        (np.arange(65536, dtype=np.uint16), 8, (256, 256), ""),
+        (np.linspace(0, 0.1, 99, dtype=np.float32), None, (0, 0), ""),
+    ],
+)
+def test_levels_that_8_bits_lose_are_counted(texels, depth, levels, words):
+    convert = TexelMap(TextureRule("ggx:roughness", "ggx:alpha"), texels.dtype, depth)
+    convert(texels)
+    assert convert.report().levels == levels
+    assert convert.report().lost_levels() == words
+
+
+def test_a_nan_that_signals_is_one():
+    texels = np.array([0x7F800001, 0x3F000000], np.uint32).view(np.float32)
+    found = quiet(texels, TextureRule("ggx:roughness", "ggx:alpha"))
+    assert np.isnan(found[0])
+    assert found[1] == 0.25
+
+
+@pytest.mark.parametrize("name", ["blinn-phong:blender-obj", "blinn-phong:blender-2.8"])
+def test_texels_follow_the_rule_that_a_program_has_for_textures(name):
+    """Blender has the picture of a roughness socket as map_Ns, where its numbers are exponents."""
+    texels = levels(np.uint8)
+    rule = TextureRule(name, "ggx:alpha")
+    assert rule.endpoints()[0].label == "ggx:roughness"
+    expected = np.rint(np.square(texels / 255) * 255)
+    assert np.array_equal(convert_texture(texels, rule), expected)
+    there, back = TextureRule("ggx:alpha", name), TextureRule("ggx:alpha", "ggx:roughness")
+    assert np.array_equal(convert_texture(texels, there), convert_texture(texels, back))
+
+
+@pytest.mark.parametrize("name", ["blinn-phong:obj2gltf", "blinn-phong:fbx", "phong:linear:128"])
+def test_texels_that_are_not_known_are_refused(name):
+    for pair in ((name, "ggx"), ("ggx", name)):
+        with pytest.raises(MdfconvError, match=r"texels of .* are is not known") as caught:
+            TextureRule(*pair).endpoints()
+        for meant in ("ggx:glossiness", "blinn-phong:exponent", "ggx:roughness"):
+            assert meant in caught.value.hint
+            TextureRule(meant, "ggx").endpoints()
+    # Who has looked it up says so.
+    assert TextureRule(endpoint(name), "ggx").endpoints()[0].label == endpoint(name).label
 
 
 def test_what_is_too_rough_for_the_target_is_the_roughest():

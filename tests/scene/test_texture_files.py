@@ -1,5 +1,8 @@
 """Textures in files: what is converted, and what is kept."""
 
+import struct
+import zlib
+
 import numpy as np
 import OpenEXR
 import pytest
@@ -86,32 +89,98 @@ def test_lzw(tmp_path):
     assert np.array_equal(read(tmp_path / "b.tif"), texels)
 
 
-UPRIGHT = {
-    1: lambda rows: rows,
-    2: np.fliplr,
-    3: lambda rows: np.rot90(rows, 2),
-    4: np.flipud,
-    5: lambda rows: rows.swapaxes(0, 1),
-    6: lambda rows: np.rot90(rows, -1),
-    7: lambda rows: np.rot90(rows.swapaxes(0, 1), 2),
-    8: np.rot90,
-}
+def orientation_of(path):
+    """Return the tag of a PNG or a TIFF, as Pillow reads it."""
+    with Image.open(path) as image:
+        return image.getexif().get(274, 1)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
 @pytest.mark.parametrize("channels", [1, 3])
-@pytest.mark.parametrize("orientation", UPRIGHT)
-def test_orientation_stays_in_tiff_and_is_applied_elsewhere(tmp_path, orientation, channels, dtype):
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_texels_and_the_tag_of_a_tiff_stay(tmp_path, orientation, channels, dtype):
     texels = samples(9, 5, channels, dtype)
     source = write_tiff(tmp_path / "a.tif", texels, tags={274: [orientation]})
     texels[..., -1] = convert_texture(texels[..., -1], RULE)
     channel = "l" if channels == 1 else "b"
-    convert_texture_file(source, tmp_path / "b.tif", RULE, channel=channel)
-    found, tags = read_tiff(tmp_path / "b.tif")
-    assert tags[274] == (orientation,)
-    assert np.array_equal(found, texels)
-    convert_texture_file(source, tmp_path / "b.png", RULE, channel=channel)
-    assert np.array_equal(read(tmp_path / "b.png"), UPRIGHT[orientation](texels))
+    for name in ("b.tif", "b.png"):
+        report = convert_texture_file(source, tmp_path / name, RULE, channel=channel)
+        assert np.array_equal(read(tmp_path / name), texels)
+        assert orientation_of(tmp_path / name) == orientation
+        assert not report.remarks
+    assert [name for name, _ in png_chunks(tmp_path / "b.png")].count(b"eXIf") == (orientation > 1)
+
+
+def exif(orientation, order="<"):
+    """Return EXIF with nothing but the orientation."""
+    start = b"II*\0" if order == "<" else b"MM\0*"
+    return start + struct.pack(f"{order}IHHHIHHI", 8, 1, 274, 3, 1, orientation, 0, 0)
+
+
+def raw_profile(data):
+    """Return EXIF in the text in which ImageMagick writes it."""
+    data = b"Exif\0\0" + data
+    return b"\nexif\n%8d\n" % len(data) + data.hex().encode() + b"\n"
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("form", ["chunk", "text", "packed"])
+def test_texels_and_the_tag_of_a_png_stay(tmp_path, form, order):
+    texels = samples(9, 5, 3, np.uint8)
+    keyword, data = b"Raw profile type exif", exif(6, order)
+    tag = {
+        "chunk": (b"eXIf", data),
+        "text": (b"tEXt", keyword + b"\0" + raw_profile(data)),
+        "packed": (b"zTXt", keyword + b"\0\0" + zlib.compress(raw_profile(data))),
+    }[form]
+    source = write_png(tmp_path / "a.png", texels, more=[(b"tEXt", b"Title\0wood"), tag])
+    texels[..., 1] = convert_texture(texels[..., 1], RULE)
+    for name in ("b.png", "b.tif"):
+        report = convert_texture_file(source, tmp_path / name, RULE, channel="g")
+        assert np.array_equal(read(tmp_path / name), texels)
+        assert not report.remarks
+    assert png_chunks(tmp_path / "b.png")[1:-2] == [tag]
+    assert orientation_of(tmp_path / "b.tif") == 6
+    report = convert_texture_file(source, tmp_path / "b.tga", RULE, channel="g")
+    assert "orientation 6, which TGA does not hold" in report.remarks[0]
+    with Image.open(tmp_path / "b.tga") as found:
+        assert np.array_equal(np.asarray(found), texels)
+
+
+def test_a_tag_behind_the_texels_of_a_png_is_kept(tmp_path):
+    texels = samples(9, 5, 1, np.uint8)
+    content = write_png(tmp_path / "a.png", texels, more=[(b"eXIf", exif(8))]).read_bytes()
+    chunk = content[33 : 33 + 12 + len(exif(8))]
+    whole = content.replace(chunk, b"").replace(content[-12:], chunk + content[-12:])
+    (tmp_path / "a.png").write_bytes(whole)
+    for name in ("b.png", "b.tif"):
+        convert_texture_file(tmp_path / "a.png", tmp_path / name, RULE)
+        expected = convert_texture(texels[..., 0], RULE)
+        assert np.array_equal(read(tmp_path / name)[..., 0], expected)
+        assert orientation_of(tmp_path / name) == 8
+    assert (b"eXIf", exif(8)) in png_chunks(tmp_path / "b.png")
+
+
+@pytest.mark.parametrize("data", [b"", b"MM", b"II*\0\xff\xff\xff\xff", exif(6)[:20]])
+def test_exif_that_says_nothing_is_kept(tmp_path, data):
+    source = write_png(tmp_path / "a.png", samples(9, 5, 1, np.uint8), more=[(b"eXIf", data)])
+    for name in ("b.png", "b.tif"):
+        convert_texture_file(source, tmp_path / name, RULE)
+    assert orientation_of(tmp_path / "b.tif") == 1
+    assert png_chunks(tmp_path / "b.png")[1] == (b"eXIf", data)
+
+
+def test_texels_and_the_tag_of_a_jpeg_stay(tmp_path):
+    grey = Image.fromarray(np.repeat(np.arange(0, 240, 8, np.uint8)[None], 8, axis=0))
+    tag = Image.Exif()
+    tag[274] = 6
+    grey.save(tmp_path / "a.jpg", exif=tag, quality=100)
+    with Image.open(tmp_path / "a.jpg") as image:
+        expected = convert_texture(np.asarray(image), RULE)
+    for name in ("b.png", "b.tif"):
+        convert_texture_file(tmp_path / "a.jpg", tmp_path / name, RULE, lossy=True)
+        assert np.array_equal(read(tmp_path / name)[..., 0], expected)
+        assert orientation_of(tmp_path / name) == 6
 
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64])
@@ -302,10 +371,34 @@ def test_every_half_is_kept_in_windows_tiles_and_any_order(tmp_path, monkeypatch
         assert written == given
 
 
+@pytest.mark.parametrize(
+    ("name", "lossy"),
+    [
+        ("PXR24", {"float32"}),
+        *((f"B44{letter}", {"float16"}) for letter in ("", "A")),
+        *((f"DWA{letter}", {"float16", "float32"}) for letter in "AB"),
+        *((name, set()) for name in ("NO", "RLE", "ZIP", "ZIPS", "PIZ")),
+    ],
+)
+def test_losses_of_exr_are_accepted_if_at_all(tmp_path, name, lossy):
+    for dtype in ("float16", "float32"):
+        y, x = np.mgrid[:40, :40]
+        texels = (0.5 + 0.4 * np.sin(x / 3) * np.cos(y / 5)).astype(dtype)
+        compression = getattr(OpenEXR, f"{name}_COMPRESSION")
+        source = write_exr(tmp_path / "a.exr", compression, G=texels)
+        # What a decoder gives back is what it got, or it is called lossy.
+        assert np.array_equal(read_exr(source)["G"], texels) == (dtype not in lossy)
+        if dtype in lossy:
+            with pytest.raises(MdfconvError, match="with losses") as caught:
+                convert_texture_file(source, tmp_path / "b.exr", RULE)
+            assert (caught.value.argument, name.lower() in str(caught.value)) == ("lossy", True)
+        convert_texture_file(source, tmp_path / "b.exr", RULE, lossy=dtype in lossy)
+
+
 def test_exr_with_losses_is_written_without(tmp_path):
     channels = {name: np.random.default_rng(1).random((40, 40), np.float32) for name in "RG"}
     write_exr(tmp_path / "a.exr", OpenEXR.DWAA_COMPRESSION, **channels)
-    convert_texture_file(tmp_path / "a.exr", tmp_path / "b.exr", RULE, channel="r")
+    convert_texture_file(tmp_path / "a.exr", tmp_path / "b.exr", RULE, channel="r", lossy=True)
     before, after = (read_exr(tmp_path / name) for name in ("a.exr", "b.exr"))
     assert np.array_equal(after["G"], before["G"])
     assert np.array_equal(after["R"], convert_texture(before["R"].clip(0, 1), RULE))

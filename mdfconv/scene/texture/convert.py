@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeAlias
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from mdfconv.errors import MdfconvError, MdfconvWarning
 from mdfconv.output.files import staged_files
 from mdfconv.scene.texture import images
+from mdfconv.scene.texture.channels import ChannelMove
 from mdfconv.scene.texture.images import PictureFile
 from mdfconv.scene.texture.rule import TextureRule, ValueConverter
 from mdfconv.scene.texture.texel_map import BLOCK, TexelMap, TextureReport
@@ -85,6 +87,8 @@ def convert_texture_file(
     rule: TextureRule,
     *,
     channel: str | None = None,
+    to_channel: str | None = None,
+    into: str | Path | PictureFile | None = None,
     depth: int | None = None,
     dither: bool = False,
     lossy: bool = False,
@@ -95,8 +99,9 @@ def convert_texture_file(
     """Convert a texture in a PNG, TIFF, TGA or OpenEXR file, and write it to another.
 
     The other channels, the ICC profile and the resolution are kept, bit by bit unless the depth
-    changes, and a TIFF's orientation. Values are taken as they are stored: a profile is not
-    applied.
+    changes. Values are taken as they are stored, and stay where they are: neither a profile nor a
+    tag of the orientation is applied, and both are kept. Palettes, and 1, 2 or 4 bits, become
+    8 bits.
 
     Parameters
     ----------
@@ -108,9 +113,17 @@ def convert_texture_file(
         What to convert, and how.
     channel : str, optional
         r, g, b, a or l (grey), in EXR the channel's name; several as ``"rgb"`` or ``"r,g"``, as
-        for grey that is stored as colour. Needed if there is more than one.
+        for grey that is stored as colour. Needed if there is more than one. A grey picture has r,
+        g and b, which are grey, and becomes one of colours if one of them is chosen.
+    to_channel : str, optional
+        Where the results go, as many as `channel` names, as a smoothness in alpha becomes a
+        roughness in green; into `channel` itself if not given. The channel that they come from
+        stays as it is. Alpha is added if it is not there.
+    into : str, Path or PictureFile, optional
+        A picture of the same size, with all the other channels of the result and what it says of
+        itself, instead of the source.
     depth : int, optional
-        8 or 16 bits for the result; kept if not given.
+        8 or 16 bits for the result; kept if not given, that of `into` if there is one.
     dither : bool
         Whether a result of 8 bits hands its rounding errors to the neighbours.
     lossy : bool
@@ -133,29 +146,37 @@ def convert_texture_file(
     MdfconvError
         If the rule, the source or the output cannot be; nothing is then written.
     """
-    source, output = (
-        each if isinstance(each, PictureFile) else PictureFile(Path(each))
-        for each in (source, output)
-    )
+    result = _picture_file(output)
+    files = [_picture_file(file) for file in (source, into) if file is not None]
     ValueConverter(rule)  # names are wrong more often than files
-    source_form, form = images.check_files(source, output, lossy=lossy)
-    with (
-        nullcontext(fill) if fill else _staged() as place,
-        images.open_picture(
-            source, source_form, lossy=lossy, max_pixels=max_pixels, upright=bool(form.bands)
-        ) as picture,
-    ):
-        channels = images.find_channels(picture, channel)
-        width, dtype = picture.width if dither else None, picture.dtype_of(channels)
-        convert = TexelMap(rule, dtype, depth, width, channels=len(channels))
-        images.check_output(picture, form, convert.dtype)
-        rows = progress("rows", picture.height) if progress else nullcontext(lambda _: None)
-        written = images.written(place(output.path), form, picture, convert.dtype)
+    forms = [images.check_files(file, result, lossy=lossy) for file in files]
+    with nullcontext(fill) if fill else _staged() as place, ExitStack() as opened:
+        pictures = [
+            opened.enter_context(
+                images.open_picture(file, *both, lossy=lossy, max_pixels=max_pixels)
+            )
+            for file, both in zip(files, forms, strict=True)
+        ]
+        base, form = pictures[-1], forms[-1][1]
+        move = ChannelMove(pictures[0], base, channel, to_channel)
+        width = base.width if dither else None
+        convert = TexelMap(rule, move.dtype, depth or move.depth, width, channels=len(move))
+        dtype = move.dtype_of_result(convert)
+        images.check_output(base, move.layout, form, dtype)
+        written = images.written(
+            place(result.path), form, base, move.layout, dtype, new_alpha=move.new_alpha
+        )
+        rows = progress("rows", base.height) if progress else nullcontext(lambda _: None)
         with written as write, rows as advance:
-            for block in picture.blocks(BLOCK):
-                write(_converted(block, channels, convert))
-                advance(len(block))
-        return replace(convert.report(), remark=picture.remark())
+            for top, bottom in images.row_blocks(pictures, BLOCK):
+                write(move.rows(top, bottom, convert))
+                advance(bottom - top)
+        remarks = chain.from_iterable(picture.remarks(form) for picture in pictures)
+        return replace(convert.report(), channels=str(move), remarks=tuple(remarks))
+
+
+def _picture_file(file: str | Path | PictureFile) -> PictureFile:
+    return file if isinstance(file, PictureFile) else PictureFile(Path(file))
 
 
 @contextmanager
@@ -163,25 +184,6 @@ def _staged() -> Iterator[Callable[[Path], Path]]:
     """Give a place beside a file's own, which it gets in the end."""
     with staged_files(lambda _: False) as files:
         yield files.fill
-
-
-def _converted(block: NDArray[Any], channels: tuple[int, ...], convert: TexelMap) -> NDArray[Any]:
-    """Return some rows with the chosen channels converted, and the others in their depth."""
-    rescaled = _rescaled(block, convert.dtype)
-    for place, channel in enumerate(channels):
-        # Of floats of several types the block has the widest.
-        texels = block[..., channel].astype(convert.source_dtype, copy=False)
-        rescaled[..., channel] = convert(texels, place)
-    return rescaled
-
-
-def _rescaled(block: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Return the channels that are not converted in the depth of the result."""
-    if block.dtype == dtype or dtype.kind == "f":
-        return block.copy()
-    if dtype == np.uint16:
-        return block * np.uint16(257)
-    return np.rint(block / np.float32(257)).astype(np.uint8)
 
 
 def convert_texture_bytes(

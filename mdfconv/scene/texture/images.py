@@ -9,6 +9,7 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
+from math import lcm
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from mdfconv.errors import MdfconvError
 from mdfconv.output.kinds import HEAD_BYTES, refuse_foreign
 from mdfconv.scene.texture import headers
+from mdfconv.scene.texture.channels import ALPHA, GREY, Layout
 from mdfconv.scene.texture.headers import PngHeader, Reason
 
 
@@ -35,46 +37,7 @@ def quiet_streams() -> Iterator[None]:
         yield
 
 
-_GREY = ("y", "l", "grey", "gray")
-
-
-def find_channels(picture: Picture, chosen: str | None) -> tuple[int, ...]:
-    """Return which channels of a picture are to be converted.
-
-    Chosen is one name, several with commas between, or letters that are names each, as ``"rgb"``;
-    None for the only one. Case does not matter where it does not tell two apart, and grey has
-    several names.
-    """
-    source, names = picture.source, picture.names
-    known = ", ".join(name.lower() if len(name) == 1 else name for name in names)
-    if chosen is None:
-        if len(names) != 1:
-            raise MdfconvError(
-                f"{source} has the channels {known}", "choose one channel", argument="channel"
-            )
-        return (0,)
-    whole = _find(names, chosen)
-    parts = chosen.split(",") if "," in chosen else list(chosen)
-    places = [whole] if whole is not None else [_find(names, part) for part in parts]
-    indices = tuple(index for index in places if index is not None)
-    if not indices or len(set(indices)) != len(places):
-        raise MdfconvError(f"{source} has no channel '{chosen}'", f"its channels are {known}")
-    return indices
-
-
-def _find(names: Sequence[str], name: str) -> int | None:
-    if name in names:
-        return names.index(name)
-    keys = [_key(each) for each in names]
-    return keys.index(_key(name)) if keys.count(_key(name)) == 1 else None
-
-
-def _key(name: str) -> str:
-    key = name.strip().lower()
-    return "grey" if key in _GREY else key
-
-
-# A small file can claim any size, and what is interlaced or turned is held as a whole.
+# A small file can claim any size, and what is interlaced is held as a whole.
 MAX_PIXELS = 1 << 27
 _ACCEPT_LOSSES = "take the original, or accept the losses"
 _LOSSLESS = ("", "none", "rle", "lzw", "zip", "zips", "piz", "packbits", "lzma", "zstd", "htj2k")
@@ -84,9 +47,11 @@ _LARGEST_MIXED = 1 << 24
 _PNG_SETTINGS = {"png:filter": 16, "png:compressionLevel": 4}
 # Beyond it a PNG cannot say how many texels a metre has.
 _PNG_LIMIT = 1 << 31
-# By the number of TIFF's orientation: swap the axes, then reverse columns and rows.
-_TURNS = {
-    number: (number > 4, number in (2, 3, 6, 7), number in (3, 4, 7, 8)) for number in range(2, 9)
+# Compressions of OpenEXR that alter the texels of some types.
+_LOSSY_TYPES = {
+    "pxr24": ("float", "double"),
+    **dict.fromkeys(("b44", "b44a"), ("half",)),
+    **dict.fromkeys(("dwaa", "dwab"), ("half", "float", "double")),
 }
 # OpenImageIO's names of types.
 _FLOATS = {"half": "float16", "float": "float32", "double": "float64"}
@@ -94,7 +59,7 @@ _DTYPES = {"uint8": "uint8", "uint16": "uint16"} | _FLOATS
 _NAMES = {dtype: name for name, dtype in _DTYPES.items()}
 # Of the attributes of a picture those that are about its texels; the writer of TIFF makes the
 # vertical resolution from the horizontal one and the aspect.
-_ATTRIBUTES = ("XResolution", "YResolution", "ResolutionUnit", "PixelAspectRatio", "Orientation")
+_ATTRIBUTES = ("XResolution", "YResolution", "ResolutionUnit", "PixelAspectRatio")
 
 
 @dataclass(frozen=True)
@@ -107,7 +72,7 @@ class PictureForm:
     endings: tuple[str, ...]
     # What files of it start with; none if there is nothing to tell them by.
     signatures: tuple[bytes, ...] = ()
-    # The channels that it holds; none if it holds any, and keeps a picture's orientation, too.
+    # The channels that it holds; none if it holds any.
     bands: tuple[str, ...] = ()
     # Why a file of it is no texture, if it is none.
     reason: Callable[[Path], Reason | None] = lambda _: None
@@ -133,6 +98,19 @@ _FORMS = (PNG, TIFF, TGA, EXR, JPEG)
 def _form_named(path: Path) -> PictureForm | None:
     """Return the form that a file's name says."""
     return next((form for form in _FORMS if path.suffix.lower() in form.endings), None)
+
+
+def pictures_in(folder: Path) -> list[Path]:
+    """Return the files of a folder that are pictures by their names, in alphabetical order."""
+    pictures = [path for path in sorted(folder.iterdir()) if _form_named(path) and path.is_file()]
+    if not pictures:
+        raise MdfconvError(f"{folder} has no file that is a PNG, TIFF, TGA or OpenEXR by its name")
+    return pictures
+
+
+def result_name(path: Path) -> Path:
+    """Return a name of the same stem whose form a texture may have: for a JPEG that of a PNG."""
+    return path.with_suffix(PNG.endings[0]) if _form_named(path) is JPEG else path
 
 
 @dataclass(frozen=True)
@@ -190,32 +168,39 @@ def _form_of(source: PictureFile) -> PictureForm:
 
 
 class Picture:
-    """An open picture that is read some rows at a time.
+    """An open picture that is read some rows at a time, in the order in which it is stored."""
 
-    If it is to be upright its orientation is applied, not kept: the rows come as they are looked
-    at.
-    """
-
-    def __init__(self, source: PictureFile, form: PictureForm, file: Any, *, upright: bool) -> None:
+    def __init__(
+        self, source: PictureFile, form: PictureForm, file: Any, output: PictureForm
+    ) -> None:
         self.source, self.form, self._file = source, form, file
         self.spec = file.spec()
-        self.names: tuple[str, ...] = self.spec.channelnames
+        names: tuple[str, ...] = self.spec.channelnames
         self.kinds = [str(self.spec.channelformat(at)) for at in range(self.spec.nchannels)]
         # Halves are exact as singles.
         self._kind = self.kinds[0] if len(set(self.kinds)) == 1 else "float"
-        turn = _TURNS.get(self.spec.get_int_attribute("Orientation", 1))
-        self._turn = turn if upright else None
         self.width, self.height = self.spec.width, self.spec.height
-        if self._turn and self._turn[0]:
-            self.width, self.height = self.height, self.width
+        # All channels, and those that the picture has if nobody asks for others.
+        self.whole = self.layout = Layout(names, tuple(range(len(names))))
+        self.unused_alpha = form is TGA and headers.has_unused_alpha(source.path)
+        if self.unused_alpha and output is not TGA:
+            self.layout = Layout(names[:3], (0, 1, 2))
+        if form is PNG and PngHeader(source.path).has_grey_palette():
+            alpha = (ALPHA,) if ALPHA in names else ()
+            self.whole = self.layout = Layout((GREY, *alpha), (0, *(3 for _ in alpha)))
+
+    @property
+    def orientation(self) -> int:
+        """By which of EXIF's numbers it is to be turned for the eye: 1 for not at all."""
+        tag = int(self.spec.get_int_attribute("Orientation", 1))
+        return PngHeader(self.source.path).orientation if self.form is PNG and tag == 1 else tag
 
     def dtype_of(self, channels: Sequence[int]) -> np.dtype[Any]:
-        """Return the type of the texels of some channels, which must have the same."""
+        """Return the type of the texels of some channels of the file, which must have the same."""
         for channel in channels:
             if self.kinds[channel] not in _DTYPES:
-                raise MdfconvError(
-                    f"{self.source}: channel {self.names[channel]} holds integers, not floats"
-                )
+                name = self.spec.channelnames[channel]
+                raise MdfconvError(f"{self.source}: channel {name} holds integers, not floats")
         kinds = {self.kinds[channel] for channel in channels}
         if len(kinds) > 1:
             raise MdfconvError(
@@ -224,33 +209,27 @@ class Picture:
             )
         return np.dtype(_DTYPES[kinds.pop()])
 
-    def blocks(self, texels: int) -> Iterator[NDArray[Any]]:
-        """Yield all rows, about so many texels at a time, shape (rows, width, channels)."""
-        step = max(1, texels // self.width)
-        if self._turn:
-            axes, columns, rows = self._turn
-            whole = self._read(0, self.spec.height)
-            whole = whole.swapaxes(0, 1) if axes else whole
-            whole = whole[:: -1 if rows else 1, :: -1 if columns else 1]
-            for top in range(0, self.height, step):
-                yield np.ascontiguousarray(whole[top : top + step])
-            return
-        # Tiles and compressed rows are decoded together; a strip may be the whole picture.
-        tile = self.spec.tile_height
-        chunk = tile or self.spec.get_int_attribute("oiio:RowsPerChunk", 1)
-        if tile or 0 < chunk <= step:
-            step = max(chunk, step - step % chunk)
-        for top in range(0, self.height, step):
-            yield self._read(top, min(top + step, self.height))
+    @property
+    def block_dtype(self) -> np.dtype[Any]:
+        """The type in which rows of all channels are read."""
+        return np.dtype(_DTYPES.get(self._kind, "float32"))
 
-    def _read(self, top: int, bottom: int) -> NDArray[Any]:
+    def rows_together(self, most: int) -> int:
+        """Return how many rows, of at most so many where it is a choice, are decoded together."""
+        # Compressed rows may be as well; a strip may be the whole picture.
+        chunk: int = self.spec.get_int_attribute("oiio:RowsPerChunk", 1)
+        return self.spec.tile_height or (chunk if 0 < chunk <= most else 1)
+
+    def read(self, top: int, bottom: int) -> NDArray[Any]:
+        """Return the rows before `bottom`, shape (rows, width, channels of the file)."""
         for channel, kind in enumerate(self.kinds):
             if self._kind == "float" and kind == "uint":
                 integers = self._decode(top, bottom, channel, channel + 1, kind)
                 if integers.max() >= _LARGEST_MIXED:
                     raise MdfconvError(
-                        f"{self.source} has floats and, in channel {self.names[channel]}, integers "
-                        f"above {_LARGEST_MIXED}, which would lose digits",
+                        f"{self.source} has floats and, in channel "
+                        f"{self.spec.channelnames[channel]}, integers above {_LARGEST_MIXED}, "
+                        "which would lose digits",
                         "split it",
                     )
         return self._decode(top, bottom, 0, self.spec.nchannels, self._kind)
@@ -274,23 +253,53 @@ class Picture:
         profile = self.spec.getattribute("ICCProfile")
         return b"" if profile is None else np.asarray(profile).tobytes()
 
-    def remark(self) -> str:
-        """Return what the user must know of how the texels were taken; empty if nothing."""
+    def remarks(self, output: PictureForm) -> Iterator[str]:
+        """Yield what the user must know of how the texels were taken, and what is left out."""
         with reading(self.source):
             what = PngHeader(self.source.path).gamma() if self.form is PNG else ""
             if self.profile():
                 name = self.spec.get_string_attribute("ICCProfile:profile_description")
                 what = f"a colour profile ({name})" if name else "a colour profile"
-        return what and (
-            f"{self.source} has {what}, which is not for data: its texels were taken as they are"
-        )
+        if what:
+            yield (
+                f"{self.source} has {what}, which is not for data: its texels were taken as they "
+                "are"
+            )
+        if self.layout != self.whole:
+            yield (
+                f"{self.source} has four bytes a texel and no alpha: the fourth is left out unless "
+                "it is chosen"
+            )
+        if self.orientation != 1 and output is TGA:
+            yield (
+                f"{self.source} has a tag of the orientation {self.orientation}, which {output} "
+                "does not hold: its texels stay where they are"
+            )
+
+
+def row_blocks(pictures: Sequence[Picture], texels: int) -> Iterator[tuple[int, int]]:
+    """Yield between which rows to read pictures of one size, about so many texels at a time."""
+    height = pictures[0].height
+    step = max(1, texels // pictures[0].width)
+    together = lcm(*(picture.rows_together(step) for picture in pictures))
+    step = max(together, step - step % together)
+    for top in range(0, height, step):
+        yield top, min(top + step, height)
 
 
 @contextmanager
 def open_picture(
-    source: PictureFile, form: PictureForm, *, lossy: bool, max_pixels: int | None, upright: bool
+    source: PictureFile,
+    form: PictureForm,
+    output: PictureForm,
+    *,
+    lossy: bool,
+    max_pixels: int | None,
 ) -> Iterator[Picture]:
-    """Open a picture; refuse what is damaged, too large, or of a kind that is no roughness."""
+    """Open a picture, for an output of some form.
+
+    What is damaged, too large, or of a kind that is no roughness is refused.
+    """
     import OpenImageIO
 
     config = OpenImageIO.ImageSpec()
@@ -303,9 +312,11 @@ def open_picture(
             raise ValueError(fault)
     with closing(file):
         with reading(source):
-            picture = Picture(source, form, file, upright=upright)
+            picture = Picture(source, form, file, output)
             _check_size(picture, MAX_PIXELS if max_pixels is None else max_pixels)
-            _refuse(source, _reason(picture, lossy=lossy))
+            _refuse(source, _reason(picture))
+            if not lossy:
+                _refuse_losses(picture)
             if file.seek_subimage(1, 0) or file.seek_subimage(0, 1):
                 _refuse(source, headers.SEVERAL_PICTURES)
             file.seek_subimage(0, 0)
@@ -318,13 +329,13 @@ def _refuse(source: PictureFile, reason: Reason | None) -> None:
         raise MdfconvError(f"{source} {reason[0]}", reason[1])
 
 
-def _reason(picture: Picture, *, lossy: bool) -> Reason | None:
+def _reason(picture: Picture) -> Reason | None:
     """Return why an open picture cannot be taken, and what helps; None if it can."""
     spec = picture.spec
     if spec.deep:
         return "holds deep texels, which are no texture", ""
     space = spec.get_string_attribute("tiff:ColorSpace")
-    if space == "palette":
+    if space == "palette":  # which OpenImageIO makes a level darker
         return headers.PALETTE
     if space:
         return f"holds {space} colours, not grey or RGB(A)", ""
@@ -334,13 +345,22 @@ def _reason(picture: Picture, *, lossy: bool) -> Reason | None:
     white_is_zero = spec.get_int_attribute("tiff:PhotometricInterpretation", 1) == 0
     if white_is_zero and picture.kinds[0] != "uint8":
         return "counts from white (0) to black", "save it with black as zero"
-    if picture.form is TIFF and not lossy and not _is_lossless(spec):
-        return "is compressed with losses, which has altered the values", _ACCEPT_LOSSES
     return None
 
 
-def _is_lossless(spec: Any) -> bool:
-    return spec.get_string_attribute("compression") in _LOSSLESS
+def _refuse_losses(picture: Picture) -> None:
+    """Refuse a compression that has altered the values."""
+    name = picture.spec.get_string_attribute("compression").partition(":")[0]
+    if picture.form is EXR:
+        lossy = not set(_LOSSY_TYPES.get(name, ())).isdisjoint(picture.kinds)
+    else:
+        lossy = picture.form is TIFF and name not in _LOSSLESS
+    if lossy:
+        raise MdfconvError(
+            f"{picture.source} is compressed with losses ({name}), which has altered the values",
+            _ACCEPT_LOSSES,
+            argument="lossy",
+        )
 
 
 def _check_size(picture: Picture, limit: int) -> None:
@@ -378,7 +398,7 @@ def reading(source: PictureFile) -> Iterator[None]:
         raise MdfconvError(f"{source} is damaged, incomplete or unusual: {reason}") from None
 
 
-def check_output(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> None:
+def check_output(picture: Picture, layout: Layout, form: PictureForm, dtype: np.dtype[Any]) -> None:
     """Refuse a form that cannot hold what a picture becomes."""
     if not form.bands:
         return
@@ -386,8 +406,8 @@ def check_output(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> N
         raise MdfconvError(f"{picture.source} holds floats, which {form} does not", "write .tif")
     if form is TGA and dtype != np.uint8:
         raise MdfconvError("TGA holds 8 bits, not 16", "write .png or .tif")
-    if "".join(picture.names) not in form.bands:
-        known = ", ".join(picture.names)
+    if "".join(layout.names) not in form.bands:
+        known = ", ".join(layout.names)
         raise MdfconvError(
             f"{picture.source} has the channels {known}, which {form} does not hold", "write .tif"
         )
@@ -395,13 +415,19 @@ def check_output(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> N
 
 @contextmanager
 def written(
-    path: Path, form: PictureForm, picture: Picture, dtype: np.dtype[Any]
+    path: Path,
+    form: PictureForm,
+    picture: Picture,
+    layout: Layout,
+    dtype: np.dtype[Any],
+    *,
+    new_alpha: bool,
 ) -> Iterator[Callable[[NDArray[Any]], None]]:
     """Give what takes the rows of a converted picture, for a file that is there and empty."""
     import OpenImageIO
 
     with reading(picture.source):  # whose texts may be none
-        spec = _output_spec(picture, form, dtype)
+        spec = _output_spec(picture, layout, form, dtype)
     file: Any = OpenImageIO.ImageOutput.create(form.library)
     if not file.open(str(path), spec):
         raise OSError(file.geterror())
@@ -426,25 +452,25 @@ def written(
         headers.replace_chunks(path, _png_chunks(picture))
     if form is TGA:
         headers.check_tga(path, spec.image_bytes())
+        if picture.unused_alpha and not new_alpha:
+            headers.say_alpha_is_unused(path)
 
 
-def _output_spec(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> Any:
+def _output_spec(picture: Picture, layout: Layout, form: PictureForm, dtype: np.dtype[Any]) -> Any:
     """Return what a converted file says of itself."""
     import OpenImageIO
 
     original = picture.spec
     if form is EXR:
-        spec = original.copy()
-        # The rows come from the top.
-        spec.attribute("openexr:lineOrder", "increasingY")
-        if not _is_lossless(original):
-            spec.attribute("compression", "zip")
+        spec = _exr_spec(picture, layout)
     else:
         size = picture.width, picture.height
-        spec = OpenImageIO.ImageSpec(*size, original.nchannels, _NAMES[dtype.name])
-        spec.channelnames, spec.alpha_channel = original.channelnames, original.alpha_channel
+        spec = OpenImageIO.ImageSpec(*size, len(layout.names), _NAMES[dtype.name])
         spec.attribute("oiio:UnassociatedAlpha", 1)
         spec.attribute("compression", "none" if form is TGA else "zip")
+    spec.channelnames, spec.alpha_channel = layout.names, original.alpha_channel
+    if layout.names != original.channelnames:
+        spec.alpha_channel = layout.names.index(ALPHA) if ALPHA in layout.names else -1
     if not original.get_string_attribute("DateTime"):
         spec.attribute("DateTime", "")  # or it would be now
     if form is PNG:
@@ -452,6 +478,7 @@ def _output_spec(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> A
             spec.attribute(name, value)
     if form is TIFF:
         spec.attribute("tiff:half", 1)
+        spec.attribute("Orientation", picture.orientation)
         if profile := picture.profile():
             kind = OpenImageIO.TypeDesc(f"uint8[{len(profile)}]")
             spec.attribute("ICCProfile", kind, np.frombuffer(profile, np.uint8))
@@ -461,14 +488,33 @@ def _output_spec(picture: Picture, form: PictureForm, dtype: np.dtype[Any]) -> A
     return spec
 
 
+def _exr_spec(picture: Picture, layout: Layout) -> Any:
+    """Return what an OpenEXR file says of itself, with the channels of a layout."""
+    import OpenImageIO
+
+    spec = picture.spec.copy()
+    # The rows come from the top.
+    spec.attribute("openexr:lineOrder", "increasingY")
+    if spec.get_string_attribute("compression") not in _LOSSLESS:
+        spec.attribute("compression", "zip")
+    if layout.names != spec.channelnames:
+        kinds = [picture.kinds[place] for place in layout.places]
+        spec.nchannels = len(kinds)
+        spec.channelformats = tuple(map(OpenImageIO.TypeDesc, kinds))
+    return spec
+
+
 def _png_chunks(picture: Picture) -> bytes:
     """Return what a PNG says of its texels.
 
     OpenImageIO calls all texels sRGB there, and ends the process over a faulty profile.
     """
-    if picture.form is PNG:
-        return PngHeader(picture.source.path).texel_chunks()
-    chunks, spec = b"", picture.spec
+    spec, chunks = picture.spec, b""
+    header = PngHeader(picture.source.path) if picture.form is PNG else None
+    if picture.orientation != 1 and not (header and header.has_exif):
+        chunks += headers.exif_chunk(picture.orientation)
+    if header:
+        return header.texel_chunks() + chunks
     if profile := picture.profile():
         chunks += headers.png_chunk(b"iCCP", b"ICC profile\0\0" + zlib.compress(profile))
     x, y = (spec.get_float_attribute(f"{axis}Resolution") for axis in "XY")

@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mdfconv.distributions import distribution
+from mdfconv.distributions import Distribution, distribution
+from mdfconv.distributions.base import same
 from mdfconv.distributions.dialects import dialects_of
-from mdfconv.distributions.endpoint import Endpoint, endpoint, endpoints
+from mdfconv.distributions.endpoint import Endpoint, endpoint, endpoints, texels_of
 from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.distributions.parameter import ROUGHNESS, Encoding, Parameter
 from mdfconv.errors import MdfconvError
@@ -36,9 +37,13 @@ class TextureRule:
         Distribution and encoding. ``"ggx"`` and ``"ggx:alpha"`` store α itself,
         ``"ggx:roughness"`` r with α = r², ``"ggx:glossiness"`` g with α = (1−g)², and likewise
         for Beckmann; other distributions of a roughness store their parameter as it is.
-        Parameters that scenes use beyond 1, as exponents, need an encoding:
-        ``"blinn-phong:exponent"`` stores N / `exponent_max`, ``"blinn-phong:log2"`` v with
-        N = 2^(k v).
+        Parameters that scenes use beyond 1, as exponents, need an encoding: with A, B for
+        `exponent_min` and `exponent_max`, and a, k for `log2_offset` and `log2_scale`,
+        ``"blinn-phong:exponent"`` has N = A + (B − A) v, ``"blinn-phong:log2"`` N = 2^(a + k v)
+        and ``"blinn-phong:reflected-exponent"`` the exponent n = A + (B − A) v of the reflected
+        ray, whose N is that of ``"blinn-phong:reflected"``. The name of a program's rule, such as
+        ``"blinn-phong:blender-obj"``, stands for what the program has in textures, which may be
+        another form; an `Endpoint` is what the texels are.
     method : str, optional
         As for `mdfconv.convert`: the fit under the metric if not given, as textures use the
         whole range, on which the closed forms turn around or turn negative.
@@ -46,7 +51,7 @@ class TextureRule:
         What the fit keeps, as for `mdfconv.convert`; the light of a natural environment by
         default.
     exponent_max : float
-        N of a texel at 1 under ``exponent``; above 0. 1000 is the end of MTL's range.
+        The exponent of a texel at 1; above 0. 1000 is the end of MTL's range.
     log2_scale : float
         k of ``log2``, above 0 and at most 1000; 13, for N from 1 to 8192, is Lazarov's,
         Getting More Physical in Call of Duty: Black Ops II (SIGGRAPH 2013).
@@ -55,6 +60,11 @@ class TextureRule:
     factor : float
         What the program multiplies v by before it is read, as glTF's roughnessFactor: above 0 and
         at most 1.
+    exponent_min : float
+        The exponent of a texel at 0; from 0 to below `exponent_max`. The Source engine's maps of
+        the reflected exponent go from 1 to 150.
+    log2_offset : float
+        a of ``log2``, from −1000 to 1000, as a + k is. Many shaders have 2^(10 v + 1).
     """
 
     source: str | Endpoint
@@ -65,6 +75,8 @@ class TextureRule:
     log2_scale: float = LOG2_SCALE
     gamma: float | None = None
     factor: float = 1.0
+    exponent_min: float = 0.0
+    log2_offset: float = 0.0
 
     def endpoints(self) -> tuple[Endpoint, Endpoint]:
         """Return source and target, as `mdfconv.convert` takes them.
@@ -72,29 +84,52 @@ class TextureRule:
         Raises
         ------
         MdfconvError
-            If a name is not known or does not say how a texture stores the parameter, if
-            `exponent_max`, `log2_scale` or γ is out of its range, or if γ is none of either's.
+            If a name is not known or does not say how a texture stores the parameter, if an
+            end of the exponents, a constant of log2, the factor or γ is out of its range, if γ
+            is none of either's, or if it is not known what a program has in textures.
         """
         if not 0 < self.exponent_max < np.inf:
             raise MdfconvError(f"the largest exponent is above 0, not {self.exponent_max:g}")
+        if not 0 <= self.exponent_min < self.exponent_max:
+            raise MdfconvError(
+                f"the smallest exponent is from 0 to below the largest, {self.exponent_max:g}, "
+                f"not {self.exponent_min:g}"
+            )
         if not 0 < self.log2_scale <= _LARGEST_SCALE:
             raise MdfconvError(
                 f"the scale of log2 is above 0 and at most {_LARGEST_SCALE:g}, "
                 f"not {self.log2_scale:g}"
+            )
+        offset = self.log2_offset
+        if not max(abs(offset), abs(offset + self.log2_scale)) <= _LARGEST_SCALE:
+            raise MdfconvError(
+                f"the offset of log2, and with the scale added, is from -{_LARGEST_SCALE:g} to "
+                f"{_LARGEST_SCALE:g}, not {offset:g}"
             )
         if not 0 < self.factor <= 1:
             raise MdfconvError(f"a factor is above 0 and at most 1, not {self.factor:g}")
         return endpoints(self._endpoint(self.source), self._endpoint(self.target), self.gamma)
 
     def _endpoint(self, name: str | Endpoint) -> Endpoint:
+        """Return what the texels are, of a program that stores numbers by a rule what it has."""
         if not isinstance(name, str):
             return endpoint(name)  # which says what a name is
+        end = self._named(name)
+        texels = texels_of(end)
+        if not texels:
+            raise MdfconvError(
+                f"what the texels of {end.label} are is not known: programs copy textures as they "
+                "are, or have another rule for them than for numbers",
+                "say what they are, such as ggx:glossiness, blinn-phong:exponent or ggx:roughness",
+            )
+        return end if texels == end.label else self._named(texels)
+
+    def _named(self, name: str) -> Endpoint:
         head, colon, tail = name.partition(":")
         owner = distribution(head)
-        # What a texture stores is at most 1.
-        if owner.parameter.typical[1] <= 1:
+        known = {encoding.name: encoding for encoding in self.encodings(owner)}
+        if not known:
             return endpoint(name)
-        known = {encoding.name: encoding for encoding in self._encodings(owner.parameter)}
         if not colon:
             choices = " or ".join(f"{owner.name}:{encoding}" for encoding in known)
             raise MdfconvError(f"a texture of {owner.name} needs an encoding", choices)
@@ -106,29 +141,62 @@ class TextureRule:
             return endpoint(name)
         raise unknown_name(f"encoding of {owner.name} in a texture", tail, [*known, *dialects])
 
-    def _encodings(self, parameter: Parameter) -> tuple[Encoding, Encoding]:
-        """Return how a texture stores a parameter that scenes use beyond 1."""
-        largest, scale, symbol = self.exponent_max, self.log2_scale, parameter.symbol
-        # The roughest and the smoothest that fit: N from 1 up.
-        smoother, typical = parameter.larger_is_smoother, (min(1 / largest, 1.0), 1.0)
-        share = replace(ROUGHNESS.stored, symbol="v", larger_is_smoother=smoother)
-        linear = replace(share, name="exponent", typical=typical)
-        logarithmic = replace(share, name="log2", typical=(0.0, 1.0), lower_closed=True)
-        return (
-            Encoding(
-                "exponent",
-                linear,
-                lambda stored: stored * largest,
-                lambda exponent: exponent / largest,
-                f"{symbol} = {largest:g} v",
-            ),
-            Encoding(
-                "log2",
-                logarithmic,
-                lambda stored: np.exp2(scale * stored),
-                lambda exponent: _log2(exponent) / scale,
-                f"{symbol} = 2^({scale:g} v)",
-            ),
+    def encodings(self, owner: Distribution) -> list[Encoding]:
+        """Return how a texture stores a parameter that scenes use beyond 1; nothing of others."""
+        parameter = owner.parameter
+        # What a texture stores is at most 1.
+        if parameter.typical[1] <= 1:
+            return []
+        # The parameter in another form, such as the exponent of the reflected ray.
+        others = [
+            self._between(form.stored, f"{form.name}-exponent", form) for form in owner.encodings
+        ]
+        return [self._between(parameter, "exponent"), self._logarithmic(parameter), *others]
+
+    def _between(self, exponent: Parameter, name: str, form: Encoding | None = None) -> Encoding:
+        """Return the encoding whose texels are shares of the way between two exponents.
+
+        They are those of a parameter, or of a form of it.
+        """
+        low, high = self.exponent_min, self.exponent_max
+        width = high - low
+        # The roughest and the smoothest that fit: from 1 up.
+        stored = replace(
+            ROUGHNESS.stored,
+            symbol="v",
+            name="exponent",
+            typical=(min(max(1 - low, 0) / width, 1.0), 1.0),
+            lower_closed=low > exponent.lower or exponent.lower_closed,
+            larger_is_smoother=exponent.larger_is_smoother,
+        )
+        decode, encode = (form.decode, form.encode) if form else (same, same)
+        line = f"{exponent.symbol} = {f'{low:g} + ' if low else ''}{width:g} v"
+        return Encoding(
+            name,
+            stored,
+            lambda v: decode(low + width * v),
+            lambda parameter: (encode(parameter) - low) / width,
+            f"{line}, {form.formula}" if form else line,
+        )
+
+    def _logarithmic(self, parameter: Parameter) -> Encoding:
+        """Return the encoding whose texels rise with the logarithm of the exponent."""
+        scale, offset = self.log2_scale, self.log2_offset
+        stored = replace(
+            ROUGHNESS.stored,
+            symbol="v",
+            name="log2",
+            typical=(0.0, 1.0),
+            lower_closed=True,
+            larger_is_smoother=parameter.larger_is_smoother,
+        )
+        start = f"{offset:g} + " if offset else ""
+        return Encoding(
+            "log2",
+            stored,
+            lambda v: np.exp2(offset + scale * v),
+            lambda exponent: (_log2(exponent) - offset) / scale,
+            f"{parameter.symbol} = 2^({start}{scale:g} v)",
         )
 
 

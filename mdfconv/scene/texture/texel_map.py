@@ -117,8 +117,14 @@ class TextureReport:
         How many were answered, and how many were treated as `ValueConverter` says.
     before, after : numpy.ndarray of int, shape (256,)
         Histograms of the stored values from 0 to 1; without NaN.
-    remark : str
-        What else the user must know; "" if nothing.
+    levels : tuple of two int
+        Of a result rounded to 8 bits, how many different texels it has, and how many it would
+        have with 16 bits, but for no more than 256; (0, 0) of others.
+    channels : str
+        Which channels of a file were converted, such as ``"green"``, or ``"green from alpha"``;
+        "" if it has but one.
+    remarks : tuple of str
+        What else the user must know.
     """
 
     source: str
@@ -128,7 +134,9 @@ class TextureReport:
     outcomes: dict[Outcome, int]
     before: NDArray[np.int64]
     after: NDArray[np.int64]
-    remark: str = ""
+    levels: tuple[int, int] = (0, 0)
+    channels: str = ""
+    remarks: tuple[str, ...] = ()
 
     def notes(self, *, limits: bool = True) -> list[str]:
         """Return what the user must know; `limits` includes mirrors and the roughest."""
@@ -148,7 +156,12 @@ class TextureReport:
             for outcome, text in texts.items()
             if self.outcomes[outcome]
         ]
-        return [*counts, self.remark] if self.remark else counts
+        return [*counts, *self.remarks]
+
+    def lost_levels(self) -> str:
+        """Return how many levels remain in 8 bits, if fewer than half do; else ""."""
+        left, levels = self.levels
+        return f"{left} of {levels} levels remain" if 2 * left < levels else ""
 
 
 def draw_histograms(report: TextureReport, title: str, dpi: int = 150) -> bytes:
@@ -196,6 +209,10 @@ class _ValueTable:
         """Return how often there was each outcome."""
         return _sums(self._outcomes, self._counts, len(Outcome))
 
+    def levels(self, most: int) -> int:
+        """Return how many levels, from 0 to `most`, the texels that were met become."""
+        return np.unique(np.rint(self.values[self._counts > 0] * most)).size
+
     def histogram(self) -> NDArray[np.int64]:
         """Return the histogram of the texels that were met."""
         known = ~np.isnan(self._texels)
@@ -235,7 +252,9 @@ class TexelMap:
             if self._dither:
                 converted = self._dither[channel](converted)
         else:
-            values, outcomes = self._convert(texels.astype(np.float64))
+            with np.errstate(invalid="ignore"):  # NaN that signals is NaN, too
+                doubles = texels.astype(np.float64)
+            values, outcomes = self._convert(doubles)
             converted = self._stored(values)
             self._outcomes += np.bincount(outcomes.ravel(), minlength=len(Outcome))
             self._before += _histogram(texels)
@@ -259,7 +278,15 @@ class TexelMap:
             outcomes=dict(zip(Outcome, outcomes.tolist(), strict=True)),
             before=self._table.histogram() if self._table else self._before.copy(),
             after=self._after.copy(),
+            levels=self._levels(),
         )
+
+    def _levels(self) -> tuple[int, int]:
+        """Return how many levels there are, and how many there were with 16 bits."""
+        if self.dtype != np.uint8 or self._table is None or self._dither:
+            return 0, 0
+        deep = self._table.levels(np.iinfo(np.uint16).max)
+        return self._table.levels(np.iinfo(np.uint8).max), min(BINS, deep)
 
 
 def _sums(places: NDArray[Any], counts: NDArray[np.int64], size: int) -> NDArray[np.int64]:

@@ -213,6 +213,8 @@ def untouched(data, keywords):
 @given(SOUP)
 def test_without_a_statement_nothing_changes(data):
     data = data.replace(b"Ns", b"Nx").replace(b"Pr", b"Px") + b"\nnewmtl a"
+    # Which would be text in UTF-16.
+    data = data.lstrip(b"\xff\xfe")
     assert convert_mtl(data).data == data
 
 

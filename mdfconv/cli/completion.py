@@ -86,6 +86,13 @@ def texels(incomplete: str) -> list[str]:
     ]
 
 
+def gltf_sources(incomplete: str) -> list[str]:
+    """Return what the numbers of a glTF file can be."""
+    from mdfconv.scene.gltf.asset import AUTO
+
+    return [AUTO, *endpoints(incomplete)]
+
+
 def library_sources() -> list[str]:
     """Return what Ns of a material library can be."""
     from mdfconv.distributions.dialects import DIALECTS

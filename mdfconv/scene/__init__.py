@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 from mdfconv import lazy_face
 
 if TYPE_CHECKING:
-    from mdfconv.scene.gltf.asset import GltfConversion, GltfMaterial, convert_gltf
+    from mdfconv.scene.gltf.asset import GltfConversion, convert_gltf
     from mdfconv.scene.gltf.images import GltfTextures
+    from mdfconv.scene.gltf.repair import GltfMaterial
     from mdfconv.scene.mitsuba.convert import MitsubaConversion, MitsubaMaterial, convert_mitsuba
     from mdfconv.scene.mtl.library import MtlConversion, MtlMaterial, convert_mtl
     from mdfconv.scene.stored import MaterialProblem, ProblemKind
@@ -35,8 +36,9 @@ __all__ = [
 
 # Imported when they are asked for: a command for one of the files needs nothing of the others.
 _MODULES = {
-    "gltf.asset": ("GltfConversion", "GltfMaterial", "convert_gltf"),
+    "gltf.asset": ("GltfConversion", "convert_gltf"),
     "gltf.images": ("GltfTextures",),
+    "gltf.repair": ("GltfMaterial",),
     "mitsuba.convert": ("MitsubaConversion", "MitsubaMaterial", "convert_mitsuba"),
     "mtl.library": ("MtlConversion", "MtlMaterial", "convert_mtl"),
     "stored": ("MaterialProblem", "ProblemKind"),

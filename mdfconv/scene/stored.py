@@ -210,6 +210,8 @@ class ProblemKind(Enum):
     AUTHORED = auto()
     # What its texels are is not known.
     TEXELS = auto()
+    # The rule depends on a specular weight that is not known.
+    SPECULAR = auto()
     OTHER = auto()
 
 

@@ -66,7 +66,7 @@ CASES = {
         ["mtl", "a.mtl", "--textures"], {"--output": "b.mtl"}, ("a.mtl", "x.png"), ("x_Pr.png",)
     ),
     "gltf": Case(
-        ["gltf", "a.gltf", "--from", "blinn-phong:obj2gltf", "--textures"],
+        ["gltf", "a.gltf", "--from", "blinn-phong:peak-alpha", "--textures"],
         {"--output": "b.gltf"},
         ("a.gltf", "orm.png"),
         ("orm_ggx-roughness.png",),

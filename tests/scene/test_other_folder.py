@@ -22,7 +22,7 @@ FILES = {
 }
 WORDS = {
     "a.mtl": ["mtl"],
-    "a.gltf": ["gltf", "--from", "blinn-phong:obj2gltf"],
+    "a.gltf": ["gltf", "--from", "blinn-phong:obj2gltf:0.5"],
     "a.xml": ["mitsuba"],
 }
 

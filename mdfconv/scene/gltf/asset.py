@@ -2,64 +2,23 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterable
 from dataclasses import dataclass
-from math import isclose
-from operator import attrgetter
-from typing import Any
+from operator import itemgetter
+from pathlib import Path
 
-import numpy as np
-
-from mdfconv.conversion.values import Converted
 from mdfconv.distributions.dialects import DIALECTS, Dialect
-from mdfconv.distributions.endpoint import Endpoint, endpoints
-from mdfconv.distributions.parameter import number_text
-from mdfconv.errors import MdfconvError, MdfconvWarning
+from mdfconv.distributions.endpoint import Endpoint, endpoint
+from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
-from mdfconv.scene import stored
-from mdfconv.scene.gltf.document import FACTOR, PBR, GltfDocument
+from mdfconv.scene.gltf.document import MARK, GltfDocument
+from mdfconv.scene.gltf.ends import MaterialEnds
 from mdfconv.scene.gltf.images import GltfTextures
-from mdfconv.scene.gltf.textures import TextureConversion
+from mdfconv.scene.gltf.repair import GltfMaterial, Remark, Repair
 from mdfconv.scene.material_files import FileConversion
 from mdfconv.scene.shininess import ROUGHNESS
-from mdfconv.scene.stored import MaterialProblem, Outcome, ProblemKind
+from mdfconv.scene.stored import ProblemKind
 
-_LIMITS = {Outcome.UNIFORM: "a uniform lobe", Outcome.MIRROR: "a mirror"}
-# Digits enough that an exponent comes back from a roughness to six.
-_DIGITS = 8
-_SAME = 0.5e-8
-
-
-@dataclass(frozen=True)
-class GltfMaterial:
-    """One conversion of a material.
-
-    Parameters
-    ----------
-    name : str
-        Its name; "" if it has none.
-    index : int
-        Its place among the materials, from 0.
-    value, result : float
-        The roughness factor before, 1 where there was none, and after.
-    rmse : float
-        The error that the conversion leaves: the relative root mean square of `explain`. NaN for
-        a uniform lobe and for a texture.
-    parameter : float
-        What the program meant by the value, such as an exponent; NaN for a mirror and for a
-        texture.
-    notes : tuple of str
-        What a careful user must know.
-    """
-
-    name: str
-    index: int
-    value: float
-    result: float
-    rmse: float
-    parameter: float
-    notes: tuple[str, ...] = ()
+AUTO = "auto"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,21 +31,32 @@ class GltfConversion(FileConversion):
         What was converted, in the order of the file.
     generator : str
         What wrote the file; "" if it does not say.
+    source, target : str
+        What its numbers were taken for, and what they became.
+    remarks : tuple of (str, ProblemKind)
+        What a careful user must know of the whole file, and which option would help.
     """
 
     materials: tuple[GltfMaterial, ...]
     generator: str
+    source: str
+    target: str
+    remarks: tuple[Remark, ...] = ()
 
 
 def convert_gltf(
     data: bytes,
-    source: str | Endpoint,
+    source: str | Endpoint = AUTO,
     target: str | Endpoint = ROUGHNESS,
     *,
     metric: str | Metric = "environment",
+    specular: float | None = None,
     textures: GltfTextures | None = None,
+    texels: str | Endpoint = "",
+    folder: Path | None = None,
+    mark: bool = False,
 ) -> GltfConversion:
-    """Convert the roughness of all materials of a glTF 2.0 file.
+    """Convert the roughness of all materials of a glTF 2.0 file, and its keyframes.
 
     Parameters
     ----------
@@ -95,12 +65,28 @@ def convert_gltf(
         chunks behind it.
     source, target : str or Endpoint
         What the numbers are, such as ``"blinn-phong:obj2gltf"``, and what they become: glTF
-        defines ``"ggx:roughness"``, α = r².
+        defines ``"ggx:roughness"``, α = r². ``"auto"`` is what the file's generator stores.
+        ``"ggx:gltf-glossiness"`` is the glossiness of KHR_materials_pbrSpecularGlossiness: as
+        the target the numbers of that extension are converted where they are, as the source
+        alone they move into the roughness. A rule that depends on the specular weight takes it
+        from KHR_materials_specular where a material has it.
     metric : str or Metric
         What the fit keeps.
+    specular : float, optional
+        The weight of the specular lobe, for rules that depend on it, of materials that do not say
+        it.
     textures : GltfTextures, optional
         Where the file's textures are, if they are to be converted; materials with a texture of
         roughness are left as they are without.
+    texels : str or Endpoint
+        What the texels of those are, as a source of `TextureRule`; if not given what the source's
+        program makes of them.
+    folder : Path, optional
+        Where the buffers are that the file names, if not where its textures are; keyframes in
+        files are left as they are without.
+    mark : bool
+        Whether to mark a converted file in its ``asset.extras``. One that is marked is left as
+        it is, whether this is set or not.
 
     Returns
     -------
@@ -110,109 +96,61 @@ def convert_gltf(
     Raises
     ------
     MdfconvError
-        If the file is no glTF 2.0, or a name or the metric is not known.
+        If the file is no glTF 2.0, a name or the metric is not known, or the generator stands for
+        no source.
     """
-    pair = factor_endpoints(source, target)
-    metric = metric_named(metric)
-    document = GltfDocument(data)
-    factors, problems = _factors(document)
-    textured = {at: factor for at, factor in factors.items() if factor and document.texture_of(at)}
-    plain = {at: factor for at, factor in factors.items() if at not in textured}
-    materials: list[GltfMaterial] = []
-    changes = None
-    if textures:
-        changes = TextureConversion(document, textures, *pair, metric, textured)
-        materials = [
-            GltfMaterial(document.name(at), at, factors[at], 1.0, np.nan, np.nan, notes)
-            for at, notes in changes.notes.items()
-        ]
-        problems |= changes.problems
-    else:
-        problems |= dict.fromkeys(textured, ("has a roughness texture", ProblemKind.TEXTURE))
-    convert = stored.StoredConverter(*pair, metric, largest=1)
-    numbers, reasons, notes = _numbers(plain.values(), convert)
-    for at, factor in plain.items():
-        if factor in reasons:
-            problems[at] = reasons[factor], ProblemKind.OTHER
-        else:
-            _, parameter, result, _, rmse = numbers[factor]
-            row = factor, result, rmse, parameter, notes.get(factor, ())
-            materials.append(GltfMaterial(document.name(at), at, *row))
-    for each in materials:
-        if not isclose(each.value, each.result, rel_tol=_SAME):
-            document.set_factor(each.index, f"{each.result:.{_DIGITS}g}")
-    left = sorted(problems.items())
+    # What is wrong with the names is none of a file.
+    MaterialEnds(target if source == AUTO else source, target)
+    document, metric = GltfDocument(data), metric_named(metric)
+    if document.mark is not None:
+        return _marked(document, data, target)
+    remarks = []
+    if source == AUTO:
+        source = source_by_generator(document.generator)
+        remarks.append(_read_by_generator(document.generator, source))
+    ends = MaterialEnds(source, target, specular)
+    repair = Repair(document, ends, metric, textures, texels, folder)
+    materials = repair.convert()
+    if mark and materials:
+        repair.mark()
     return GltfConversion(
         data=document.encoded(),
-        materials=tuple(sorted(materials, key=attrgetter("index"))),
-        problems=tuple(MaterialProblem(f"materials[{at}]", *problem) for at, problem in left),
-        files=changes.files if changes else {},
-        inputs=changes.inputs if changes else (),
-        generator=document.generator,
+        materials=tuple(materials),
+        problems=tuple(problem for _, problem in sorted(repair.problems, key=itemgetter(0))),
+        files=repair.files,
+        inputs=repair.buffers.inputs,
         named=document.named_files,
+        generator=document.generator,
+        source=ends.pair[0].label,
+        target=ends.pair[1].label,
+        remarks=(*remarks, *repair.remarks),
     )
 
 
-def factor_endpoints(source: str | Endpoint, target: str | Endpoint) -> tuple[Endpoint, Endpoint]:
-    """Return both ends of a conversion; refuse what is used beyond 1, as an exponent is."""
-    pair = endpoints(source, target)
-    for argument, end in zip(("source", "target"), pair, strict=True):
-        if end.stored.typical[1] > 1:
-            raise MdfconvError(
-                f"a roughness factor is at most 1, {end.label} is more as a rule",
-                "name what the program stores",
-                argument=argument,
-            )
-    return pair
+def _marked(document: GltfDocument, data: bytes, target: str | Endpoint) -> GltfConversion:
+    """Return a file that is marked as converted as it is."""
+    pairs = document.mark.items() if isinstance(document.mark, dict) else ()
+    words = " ".join(f"{key} {value}" for key, value in pairs)
+    remark = (
+        f"marked as converted {words}".rstrip() + f", and stays as it is; without {MARK} in "
+        "asset.extras it would be converted again"
+    )
+    label = endpoint(target).label
+    return GltfConversion(
+        data=data,
+        materials=(),
+        named=document.named_files,
+        generator=document.generator,
+        source=label,
+        target=label,
+        remarks=((remark, ProblemKind.OTHER),),
+    )
 
 
-def _factors(document: GltfDocument) -> tuple[dict[int, float], dict[int, tuple[str, ProblemKind]]]:
-    """Return the roughness factors by the places of their materials, and what is wrong."""
-    factors: dict[int, float] = {}
-    problems: dict[int, tuple[str, ProblemKind]] = {}
-    for at, material in enumerate(document.materials):
-        try:
-            factors[at] = _factor(material)
-        except MdfconvError as error:
-            problems[at] = str(error), ProblemKind.OTHER
-    return factors, problems
-
-
-def _factor(material: Any) -> float:
-    """Return the roughness factor of a material, 1 if it has none."""
-    if not isinstance(material, dict):
-        raise MdfconvError("is no object")
-    pbr = material.get(PBR, {})
-    if not isinstance(pbr, dict):
-        raise MdfconvError(f"its {PBR} is no object")
-    factor = pbr.get(FACTOR, 1)
-    if not isinstance(factor, int | float) or isinstance(factor, bool) or factor != factor:
-        raise MdfconvError(f"{FACTOR} is not a number")
-    if not 0 <= factor <= 1:
-        raise MdfconvError(f"{FACTOR} {factor!s:.20} is outside 0 ≤ r ≤ 1")
-    return float(factor)
-
-
-def _numbers(
-    factors: Iterable[float], convert: stored.StoredConverter
-) -> tuple[dict[float, stored.ConvertedNumber], dict[float, str], dict[float, tuple[str, ...]]]:
-    """Return conversions of factors, why some have none, and what to know of mirrors and such."""
-    numbers = convert.table(factors)
-    reasons: dict[float, str] = {}
-    notes: dict[float, tuple[str, ...]] = {}
-    for factor, number in numbers.items():
-        if number.outcome in _LIMITS:
-            symbol = convert.source.stored.symbol
-            text = f"{symbol} = {number_text(factor)} is {_LIMITS[number.outcome]}"
-            notes[factor] = (f"{text}: {number_text(number.result)}",)
-        elif number.outcome is not Outcome.CONVERTED:
-            reasons[factor] = convert.refusal(number)
-    converted = [each for each in numbers.values() if each.outcome is Outcome.CONVERTED]
-    parameter, result = (np.array([each[at] for each in converted]) for at in (1, 2))
-    results = Converted(parameter, result, convert.target.decode_legal(result))
-    if sentences := convert.rule.true_cautions(results):
-        warnings.warn("; ".join(sentences), MdfconvWarning, stacklevel=3)
-    return numbers, reasons, notes
+def _read_by_generator(generator: str, source: str) -> Remark:
+    """Return what a generator lets take the numbers for, in words."""
+    (dialect,) = dialects_by_generator(generator)
+    return f"written by '{generator}': {dialect.formula} ({source})", ProblemKind.OTHER
 
 
 def generator_of(data: bytes) -> str:
@@ -224,3 +162,28 @@ def dialects_by_generator(generator: str) -> list[Dialect]:
     """Return the dialects of the programs that a generator may name."""
     text = generator.lower()
     return [each for each in DIALECTS if any(piece in text for piece in each.generators)]
+
+
+def source_by_generator(generator: str) -> str:
+    """Return the one source that a generator stands for.
+
+    Raises
+    ------
+    MdfconvError
+        If it stands for none, for several, or for one on a condition.
+    """
+    wrote = f"was written by '{generator}'" if generator else "does not say what wrote it"
+    found = dialects_by_generator(generator)
+    names = [f"{each.owners[0]}:{each.name}" for each in found]
+    if len(found) == 1 and not found[0].provided:
+        return names[0]
+    meant = " or ".join(
+        f"{name} {each.provided}".strip() for name, each in zip(names, found, strict=True)
+    )
+    raise MdfconvError(
+        f"{wrote}, which stands for {meant}"
+        if found
+        else f"{wrote}{', whose rule is not known' if generator else ''}",
+        "name what its numbers are; mdfconv inspect shows what the file has",
+        argument="source",
+    )

@@ -5,24 +5,95 @@ from __future__ import annotations
 import re
 import struct
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 from urllib.parse import unquote
 
 from mdfconv.errors import MdfconvError
-from mdfconv.scene.gltf.json_edit import Place, read_json
+from mdfconv.scene.gltf.json_edit import Place, object_text, read_json
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
-FACTOR = "roughnessFactor"
-TEXTURE = "metallicRoughnessTexture"
-PBR = "pbrMetallicRoughness"
+EXTENSIONS = "extensions"
+# The member of asset.extras that marks a converted file.
+MARK = "mdfconv"
 # A GLB has a header, and chunks: their size and type, and content.
 _MAGIC, _VERSION = b"glTF", 2
 _HEADER, _CHUNK_HEAD = struct.Struct("<4sII"), struct.Struct("<I4s")
 _JSON, _BINARY = b"JSON", b"BIN\0"
 _ALIGNMENT = 4
 _LARGEST = 2**32 - 1
+
+
+@dataclass(frozen=True)
+class RoughnessField:
+    """Where a material stores a roughness: a factor, 1 if absent, and a texture that it multiplies.
+
+    Parameters
+    ----------
+    path : tuple of str
+        The object of the material that has both.
+    factor, texture : str
+        Their names.
+    channel : str
+        The channel of the texture.
+    """
+
+    path: tuple[str, ...]
+    factor: str
+    texture: str
+    channel: str
+
+    @property
+    def name(self) -> str:
+        """The name of the object."""
+        return self.path[-1]
+
+    @property
+    def pointer(self) -> str:
+        """The factor by a path with slashes, as animations name it."""
+        return "/".join((*self.path, self.factor))
+
+    def values(self, material: Any) -> dict[str, Any] | None:
+        """Return the object of a material, None if it has none; refuse what is no object."""
+        if not isinstance(material, dict):
+            raise MdfconvError("is no object")
+        for name in self.path:
+            if name not in material:
+                return None
+            material = material[name]
+            if not isinstance(material, dict):
+                raise MdfconvError(f"its {name} is no object")
+        return material
+
+    def factor_of(self, material: Any) -> float | None:
+        """Return the factor of a material, None if it has no such object; refuse what is none."""
+        values = self.values(material)
+        if values is None:
+            return None
+        factor = values.get(self.factor, 1)
+        if not isinstance(factor, int | float) or isinstance(factor, bool) or factor != factor:
+            raise MdfconvError(f"{self.factor} is not a number")
+        if not 0 <= factor <= 1:
+            raise MdfconvError(f"{self.factor} {factor!s:.20} is outside 0 ≤ {self.symbol} ≤ 1")
+        return float(factor)
+
+    @property
+    def symbol(self) -> str:
+        """The symbol of the factor: r of a roughness, g of a glossiness."""
+        return self.factor[0]
+
+
+METALLIC_ROUGHNESS = RoughnessField(
+    ("pbrMetallicRoughness",), "roughnessFactor", "metallicRoughnessTexture", "g"
+)
+SPECULAR_GLOSSINESS = RoughnessField(
+    (EXTENSIONS, "KHR_materials_pbrSpecularGlossiness"),
+    "glossinessFactor",
+    "specularGlossinessTexture",
+    "a",
+)
 
 
 def is_address(uri: str) -> bool:
@@ -43,6 +114,8 @@ class GltfDocument:
         # What is behind the JSON in a GLB.
         self._text, self._chunks = _pieces(data) if is_glb(data) else (data, [])
         self._appended = bytearray()
+        self._patches: list[tuple[int, bytes]] = []
+        self._spans: dict[RoughnessField, dict[int, tuple[int, int]]] = {}
         self._added: defaultdict[str, list[str]] = defaultdict(list)
         self.json = read_json(self._text)
         asset = self.json.value.get("asset")
@@ -55,6 +128,8 @@ class GltfDocument:
         self.materials: list[Any] = self.json.value.get("materials", [])
         if not isinstance(self.materials, list):
             raise MdfconvError("is no glTF 2.0: its materials are no array")
+        animations = self.json.value.get("animations")
+        self.animations: list[Any] = animations if isinstance(animations, list) else []
 
     @property
     def binary(self) -> bytes | memoryview | None:
@@ -69,6 +144,10 @@ class GltfDocument:
         self._appended += content
         return place
 
+    def patch_binary(self, start: int, content: bytes) -> None:
+        """Replace bytes within the binary chunk."""
+        self._patches.append((start, content))
+
     @property
     def _binary_size(self) -> int:
         size = len(self.binary or b"")
@@ -79,6 +158,18 @@ class GltfDocument:
         """What wrote the file, in one line; "" if it does not say."""
         generator = self._asset.get("generator")
         return " ".join(generator.split()) if isinstance(generator, str) else ""
+
+    @property
+    def mark(self) -> Any:
+        """What marks a converted file; None if nothing does."""
+        extras = self._asset.get("extras")
+        return extras.get(MARK) if isinstance(extras, dict) else None
+
+    def set_mark(self, members: Mapping[str, str]) -> None:
+        """Mark the file with members in JSON; refuse an asset that cannot have them."""
+        if not (self._asset and isinstance(self._asset.get("extras", {}), dict)):
+            raise MdfconvError("has no asset with extras that take a mark")
+        self.set_in(self.json.root["asset"].start, ("extras",), {MARK: object_text(members)})
 
     @property
     def named_files(self) -> list[str]:
@@ -104,43 +195,56 @@ class GltfDocument:
         name = self.materials[at].get("name")
         return name if isinstance(name, str) else ""
 
-    def texture_of(self, at: int) -> Any:
+    def texture_of(self, at: int, field: RoughnessField) -> Any:
         """Return what a material says of its texture of roughness, None if it has none."""
-        return self.materials[at].get(PBR, {}).get(TEXTURE)
+        return (field.values(self.materials[at]) or {}).get(field.texture)
 
-    @cached_property
-    def _factor_spans(self) -> dict[int, tuple[int, int]]:
-        """Where factors stand, by the places of materials, if names alone tell that."""
-        owners = [
-            at
-            for at, material in enumerate(self.materials)
-            if isinstance(material, dict)
-            and isinstance(pbr := material.get(PBR), dict)
-            and FACTOR in pbr
-        ]
-        if not owners:
-            return {}
-        spans = self.json.numbers_named(FACTOR, self.json.root["materials"])
-        # As many as there are factors: then none of them is anything else.
-        same = spans is not None and len(spans) == len(owners)
-        return dict(zip(owners, spans, strict=True)) if spans and same else {}
-
-    def set_factor(self, at: int, text: str) -> None:
-        """Set the roughness factor of a material to a number in JSON."""
-        if at in self._factor_spans:
-            self.json.replace(*self._factor_spans[at], text)
-            return
+    def texture_place(self, at: int, field: RoughnessField) -> Place:
+        """Return where a material names its texture of roughness."""
         start = self._places[at].start
-        if PBR in self.materials[at]:
-            self.json.set_members(self.json.members(start)[PBR].start, {FACTOR: text})
-        else:
-            self.json.set_members(start, {PBR: f'{{"{FACTOR}": {text}}}'})
+        for name in field.path:
+            start = self.json.members(start)[name].start
+        return self.json.members(start)[field.texture]
 
-    def set_texture(self, at: int, index: int) -> None:
-        """Let a material's texture of roughness be another one."""
-        pbr = self.json.members(self._places[at].start)[PBR]
-        texture = self.json.members(pbr.start)[TEXTURE]
-        self.json.set_members(texture.start, {"index": str(index)})
+    def _factor_spans(self, field: RoughnessField) -> dict[int, tuple[int, int]]:
+        """Return where factors stand, by the places of materials, if names alone tell that."""
+        if field not in self._spans:
+            owners = [
+                at
+                for at, material in enumerate(self.materials)
+                if field.factor in _object_at(material, field.path)
+            ]
+            spans = None
+            if owners:
+                spans = self.json.numbers_named(field.factor, self.json.root["materials"])
+            # As many as there are factors: then none of them is anything else.
+            same = spans is not None and len(spans) == len(owners)
+            self._spans[field] = dict(zip(owners, spans, strict=True)) if spans and same else {}
+        return self._spans[field]
+
+    def set_factor(self, at: int, field: RoughnessField, text: str) -> None:
+        """Set the roughness factor of a material to a number in JSON."""
+        if at in (spans := self._factor_spans(field)):
+            self.json.replace(*spans[at], text)
+        else:
+            self.set_field(at, field, {field.factor: text})
+
+    def set_field(self, at: int, field: RoughnessField, members: Mapping[str, str]) -> None:
+        """Set members, in JSON, of the object in which a material has its roughness."""
+        self.set_in(self._places[at].start, field.path, members)
+
+    def set_in(self, start: int, path: Sequence[str], members: Mapping[str, str]) -> None:
+        """Set members of the object at a path from the one at a character; add what is missing."""
+        for depth, name in enumerate(path):
+            place = self.json.members(start).get(name)
+            if place is None:
+                text = object_text(members)
+                for outer in reversed(path[depth + 1 :]):
+                    text = object_text({outer: text})
+                self.json.set_members(start, {name: text})
+                return
+            start = place.start
+        self.json.set_members(start, members)
 
     @cached_property
     def _places(self) -> list[Place]:
@@ -154,22 +258,34 @@ class GltfDocument:
         for name, values in self._added.items():
             self.json.append(self.json.root[name].start, values)
         text = self.json.changed().encode()
-        if text == self._text:
+        if text == self._text and not self._patches:
             return self._data
         if not is_glb(self._data):
             return text
         chunks: list[tuple[bytes, bytes | memoryview]]
         chunks = [(_JSON, text + b" " * _padding(len(text))), *self._chunks]
-        if self._appended:
-            end = bytes(_padding(len(self._appended)))
-            binary = self._chunks[0][1].tobytes().ljust(self._binary_size, b"\0")
-            chunks[1] = _BINARY, b"".join([binary, self._appended, end])
+        if self._appended or self._patches:
+            chunks[1] = _BINARY, self._changed_binary()
         return _glb(chunks)
+
+    def _changed_binary(self) -> bytes:
+        binary = bytearray(self.binary or b"")
+        for start, content in self._patches:
+            binary[start : start + len(content)] = content
+        end = bytes(_padding(len(self._appended)))
+        return bytes(binary).ljust(self._binary_size, b"\0") + self._appended + end
 
     @cached_property
     def everything(self) -> list[tuple[str, Any]]:
         """All members of all objects in the file."""
         return walk(self.json.value)
+
+
+def _object_at(value: Any, path: Sequence[str]) -> dict[str, Any]:
+    """Return the object at a path, an empty one if there is none."""
+    for name in path:
+        value = value.get(name) if isinstance(value, dict) else None
+    return value if isinstance(value, dict) else {}
 
 
 def walk(value: Any) -> list[tuple[str, Any]]:

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 import json
 import re
+import struct
+import zlib
+from contextlib import closing
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 from urllib.parse import quote, unquote
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mdfconv.errors import MdfconvError
 from mdfconv.output.kinds import refuse_foreign
-from mdfconv.scene.gltf.document import GltfDocument, is_address
+from mdfconv.scene.gltf.buffers import GltfBuffers, data_uri, is_data
+from mdfconv.scene.gltf.document import GltfDocument
 from mdfconv.scene.gltf.json_edit import JsonText
-from mdfconv.scene.material_files import free_name, read_file
+from mdfconv.scene.material_files import free_name
 
-_DATA = re.compile(r"data:([^,]*),", re.IGNORECASE)
-_SIGNATURES = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg"}
+_PNG = b"\x89PNG\r\n\x1a\n"
+_SIGNATURES = {_PNG: ".png", b"\xff\xd8\xff": ".jpg"}
+# The colour type of a PNG.
+_RGB = 2
 _UNSAFE = re.compile(r"[^\w.-]+")
 _MIME = "image/png"
 
@@ -43,30 +50,16 @@ class GltfTextures:
     lossy: bool = False
 
 
-def index_of(value: Any, entries: list[Any], what: str) -> int:
-    """Return an index into the entries of a file; refuse what names none that is an object."""
-    if not is_count(value) or not 0 <= value < len(entries):
-        raise MdfconvError(f"names no {what} that is there")
-    if not isinstance(entries[int(value)].value, dict):
-        raise MdfconvError(f"names a {what} that is no object")
-    return int(value)
-
-
-def is_count(value: Any) -> bool:
-    """Return whether a value of JSON is an integer, however it is written."""
-    whole = isinstance(value, int) or (isinstance(value, float) and value.is_integer())
-    return whole and not isinstance(value, bool)
-
-
 class GltfImages:
     """The images of a document, which is changed; new files have an ending before the suffix."""
 
-    def __init__(self, document: GltfDocument, folders: GltfTextures, ending: str) -> None:
-        self._document, self._folders, self._ending = document, folders, ending
-        names = "images", "bufferViews", "buffers"
-        self.images, self._views, self._buffers = map(document.array, names)
+    def __init__(
+        self, document: GltfDocument, buffers: GltfBuffers, folders: GltfTextures, ending: str
+    ) -> None:
+        self._document, self._buffers = document, buffers
+        self._folders, self._ending = folders, ending
+        self.images = document.array("images")
         self.files: dict[Path, bytes] = {}
-        self._read: dict[Path, bytes] = {}
 
     def read(self, image: int) -> tuple[bytes, str]:
         """Return the content of an image and the suffix of its form."""
@@ -74,9 +67,9 @@ class GltfImages:
         if ("uri" in entry) == ("bufferView" in entry):
             raise MdfconvError("has not one of uri and bufferView")
         if "uri" in entry:
-            content = self._from_uri(entry["uri"])
+            content = self._buffers.from_uri(entry["uri"])
         else:
-            content = self._from_view(index_of(entry["bufferView"], self._views, "bufferView"))
+            content = self._buffers.from_view(entry["bufferView"])
         for signature, suffix in _SIGNATURES.items():
             if content.startswith(signature):
                 return content, suffix
@@ -86,9 +79,9 @@ class GltfImages:
     def replace(self, image: int, content: bytes) -> None:
         """Put another PNG in the place of an image, for all that use it."""
         entry, text = self.images[image].value, self._document.json
-        alone = "uri" not in entry and self._views_used.count(entry["bufferView"]) == 1
-        if alone and self._in_binary(entry):
-            text.set_members(self._views[int(entry["bufferView"])].start, self._append(content))
+        view = None if "uri" in entry else int(entry["bufferView"])
+        if view is not None and self._buffers.uses(view) == 1 and self._buffers.in_binary(view):
+            text.set_members(self._buffers.views[view].start, self._buffers.append(content))
             text.set_members(self.images[image].start, _kind(entry))
         else:
             text.set_members(self.images[image].start, *self._placed(image, content))
@@ -99,44 +92,21 @@ class GltfImages:
         copy.set_members(0, *self._placed(image, content))
         return self._document.append("images", copy.changed())
 
-    @property
-    def inputs(self) -> tuple[Path, ...]:
-        """The files that were read."""
-        return tuple(self._read)
-
-    @cached_property
-    def _views_used(self) -> list[Any]:
-        """What the document names of its buffer views, each as often as it does."""
-        return [value for key, value in self._document.everything if key == "bufferView"]
-
-    def _in_binary(self, entry: dict[str, Any]) -> bool:
-        """Return whether an image in a buffer view is in the binary chunk of a GLB."""
-        view = self._views[int(entry["bufferView"])].value
-        return view["buffer"] == 0 and "uri" not in self._buffers[0].value
-
-    def _append(self, content: bytes) -> dict[str, str]:
-        """Append to the binary chunk; return the members of a buffer view of it."""
-        offset = self._document.append_binary(content)
-        return {"byteOffset": str(offset), "byteLength": str(len(content))}
-
     def _placed(self, image: int, content: bytes) -> tuple[dict[str, str], dict[str, str]]:
         """Store a PNG where an image is; return members to set, and new names of members."""
         entry = self.images[image].value
         if "uri" in entry:
             return {"uri": self._stored(image, content, entry["uri"])} | _kind(entry), {}
-        if self._in_binary(entry):
-            members = {"buffer": "0"} | self._append(content)
-            pairs = ", ".join(f'"{name}": {value}' for name, value in members.items())
-            view = self._document.append("bufferViews", f"{{{pairs}}}")
-            return {"bufferView": str(view)} | _kind(entry), {}
-        buffer = self._buffers[int(self._views[int(entry["bufferView"])].value["buffer"])].value
-        uri = self._stored(image, content, buffer["uri"])
+        view = int(entry["bufferView"])
+        if self._buffers.in_binary(view):
+            return {"bufferView": str(self._buffers.add_view(content))} | _kind(entry), {}
+        uri = self._stored(image, content, self._buffers.uri_of(view))
         return {"bufferView": uri} | _kind(entry), {"bufferView": "uri"}
 
     def _stored(self, image: int, content: bytes, former: str) -> str:
         """Return an address in JSON of content: a data address if the former is, or a new file."""
-        if _DATA.match(former):
-            return json.dumps(f"data:{_MIME};base64,{base64.b64encode(content).decode()}")
+        if is_data(former):
+            return data_uri(content, _MIME)
         entry = self.images[image].value
         stem = Path(unquote(entry["uri"])).stem if "uri" in entry else entry.get("name")
         stem = _UNSAFE.sub("_", stem) if isinstance(stem, str) and stem else f"image{image}"
@@ -144,53 +114,38 @@ class GltfImages:
         self.files[path] = content
         return json.dumps(quote(path.name))
 
-    def _from_uri(self, uri: Any) -> bytes:
-        if not isinstance(uri, str):
-            raise MdfconvError("names a file by what is no text")
-        inside = _DATA.match(uri)
-        if inside:
-            return _decoded(uri[inside.end() :], inside[1])
-        if is_address(uri):
-            raise MdfconvError(f"names {uri}, which is no file beside it")
-        path = self._folders.source / unquote(uri)
-        if path not in self._read:
-            try:
-                self._read[path] = read_file(path)
-            except MdfconvError:
-                raise
-            except ValueError:
-                raise MdfconvError("names a file by what is no name of one") from None
-        return self._read[path]
 
-    def _from_view(self, at: int) -> bytes:
-        view = self._views[at].value
-        buffer = index_of(view.get("buffer"), self._buffers, "buffer")
-        entry = self._buffers[buffer].value
-        offset, length = view.get("byteOffset", 0), view.get("byteLength")
-        if not (is_count(offset) and is_count(length)):
-            raise MdfconvError(f"bufferViews[{at}] has no place in its buffer")
-        content: bytes | memoryview
-        if "uri" in entry:
-            content = self._from_uri(entry["uri"])
-        elif buffer == 0 and self._document.binary is not None:
-            content = self._document.binary
-        else:
-            raise MdfconvError(f"buffers[{buffer}] is not there")
-        if not 0 <= offset <= offset + length <= len(content):
-            raise MdfconvError(f"bufferViews[{at}] is not within its buffer")
-        return bytes(content[int(offset) : int(offset + length)])
+def green_of_alpha(content: bytes) -> bytes:
+    """Return a PNG whose green channel is the alpha of another one; red and blue are white."""
+    import OpenImageIO
+
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "texture.png"
+        path.write_bytes(content)
+        config = OpenImageIO.ImageSpec()
+        config.attribute("oiio:UnassociatedAlpha", 1)
+        file: Any = OpenImageIO.ImageInput.open(str(path), config)
+        with closing(file):
+            alpha = np.asarray(file.read_image(3, 4, OpenImageIO.UNKNOWN))
+    texels = np.full((*alpha.shape[:2], 3), np.iinfo(alpha.dtype).max, alpha.dtype)
+    texels[..., 1] = alpha[..., 0]
+    return _png(texels)
+
+
+def _png(texels: NDArray[Any]) -> bytes:
+    """Return a PNG of RGB texels of 8 or 16 bits, shape (height, width, 3)."""
+    height, width, _ = texels.shape
+    rows = texels.astype(texels.dtype.newbyteorder(">")).reshape(height, -1).view(np.uint8)
+    # Each row starts with its filter, 0 for none.
+    packed = zlib.compress(np.pad(rows, ((0, 0), (1, 0))).tobytes())
+    header = struct.pack(">IIBBBBB", width, height, 8 * texels.itemsize, _RGB, 0, 0, 0)
+    content = _PNG
+    for name, data in ((b"IHDR", header), (b"IDAT", packed), (b"IEND", b"")):
+        checksum = struct.pack(">I", zlib.crc32(name + data))
+        content += struct.pack(">I", len(data)) + name + data + checksum
+    return content
 
 
 def _kind(entry: dict[str, Any]) -> dict[str, str]:
     """Return what to set for an image that says to be no PNG."""
     return {"mimeType": f'"{_MIME}"'} if entry.get("mimeType", _MIME) != _MIME else {}
-
-
-def _decoded(payload: str, kind: str) -> bytes:
-    """Return the content of a data address."""
-    if not kind.lower().endswith(";base64"):
-        return unquote(payload, "latin-1").encode("latin-1", errors="replace")
-    try:
-        return base64.b64decode(payload, validate=True)
-    except (binascii.Error, ValueError):
-        raise MdfconvError("has a data address that is no base64") from None

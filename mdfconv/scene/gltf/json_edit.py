@@ -133,8 +133,7 @@ class JsonText:
             self._edits.append((members[name].start, members[name].end, values[name]))
         added = [name for name in values if name not in members]
         if not members:
-            texts = [f"{json.dumps(name)}: {values[name]}" for name in added]
-            self._edits.append((start + 1, start + 1, ", ".join(texts)))
+            self._edits.append((start + 1, start + 1, object_text(values)[1:-1]))
         elif added:
             last = max(members.values(), key=lambda place: place.end)
             texts = [f"{json.dumps(name)}{last.colon}{values[name]}" for name in added]
@@ -154,6 +153,12 @@ class JsonText:
     def changed(self) -> str:
         """Return the text with all changes."""
         return spliced(self._text, self._edits)
+
+
+def object_text(members: Mapping[str, str]) -> str:
+    """Return an object of members in JSON."""
+    texts = (f"{json.dumps(name)}: {value}" for name, value in members.items())
+    return f"{{{', '.join(texts)}}}"
 
 
 def read_json(data: bytes) -> JsonText:

@@ -7,6 +7,7 @@ roughness by rules of their own: what they make of one, and what that costs, sta
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -23,8 +24,15 @@ from mdfconv.fitting.solve import errors_of_many
 from mdfconv.scene.stored import UNIFORM_BELOW, StoredConverter
 
 SHININESS, ROUGHNESS = "blinn-phong", "ggx:roughness"
+# Of linear red, green and blue, in the digits of obj2gltf and assimp.
+_LUMINANCE = (0.2125, 0.7154, 0.0721)
 # Its Pr is 4e-5: no library means anything beyond.
 _LARGEST_EXPONENT = 1e18
+
+
+def luminance(colour: Sequence[float]) -> float:
+    """Return the specular weight that importers take from a specular colour of three numbers."""
+    return math.fsum(share * part for share, part in zip(_LUMINANCE, colour, strict=True))
 
 
 def roughness_of(exponent: Array, metric: Metric) -> Array:

@@ -14,14 +14,13 @@ from mdfconv.scene.gltf.document import (
     SPECULAR_GLOSSINESS,
     RoughnessField,
 )
+from mdfconv.scene.shininess import luminance
 
 Pair: TypeAlias = tuple[Endpoint, Endpoint]
 
 # What is stored in an extension of its own.
 GLOSSINESS = "ggx:gltf-glossiness"
 SPECULAR = "KHR_materials_specular"
-# Of Rec. 709, in the digits of obj2gltf and assimp.
-_LUMINANCE = (0.2125, 0.7154, 0.0721)
 
 
 class MaterialEnds:
@@ -107,10 +106,10 @@ def specular_weight(material: dict[str, Any]) -> float | None:
     if specular is None:
         return None
     try:
-        factor, color = specular.get("specularFactor", 1), specular.get("specularColorFactor")
-        shares = zip(_LUMINANCE, [1, 1, 1] if color is None else color, strict=True)
+        factor, colour = specular.get("specularFactor", 1), specular.get("specularColorFactor")
+        weight = factor * luminance([1, 1, 1] if colour is None else colour)
         # Without what the sum rounds.
-        return float(f"{float(factor * sum(share * part for share, part in shares)):.9g}")
+        return float(f"{float(weight):.9g}")
     except (AttributeError, TypeError, ValueError, OverflowError):
         raise MdfconvError(f"its {SPECULAR} has no specular colour") from None
 

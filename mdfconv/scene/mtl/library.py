@@ -18,7 +18,7 @@ from mdfconv.scene.material_files import FileConversion, TextureFolder
 from mdfconv.scene.mtl import statements
 from mdfconv.scene.mtl.meaning import AUTO, NsMeaning, asked_meaning, likely_meaning
 from mdfconv.scene.mtl.statements import Line, MaterialBlock
-from mdfconv.scene.shininess import ROUGHNESS, SHININESS, exponent_of, fit_error
+from mdfconv.scene.shininess import ROUGHNESS, SHININESS, exponent_of, fit_error, luminance
 from mdfconv.scene.stored import UNIFORM_BELOW, MaterialProblem, ProblemKind
 from mdfconv.scene.texture.convert import Progress
 from mdfconv.scene.texture.rule import TextureRule
@@ -361,8 +361,8 @@ def _material(
     }
     notes = tuple(text for text, holds in remarks.items() if holds)
     line = source.lines[-1].number
-    colours = source.block.having(b"Ks")
-    specular = statements.luminance(colours[-1]) if colours else np.nan
+    colours = [statements.colour(line) for line in source.block.having(b"Ks")]
+    specular = luminance(colours[-1]) if colours and colours[-1] else np.nan
     return MtlMaterial(
         source.block.name, line, shininess, roughness, exponent, specular, rmse, notes
     )

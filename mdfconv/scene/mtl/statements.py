@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -22,8 +21,6 @@ _TEXTURE = re.compile(rb"[ \t]*(?:map_\w+|bump|disp|decal|refl|norm)[ \t]+(.*)\Z
 _NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\Z")
 # What follows "1." of an infinity or of what is no number: "#INF00", "#QNAN0", "#IND".
 _NO_NUMBER = re.compile(rb"#(?:INF|IND|QNAN|SNAN)")
-# Of linear red, green and blue, as importers of libraries take them.
-_LUMINANCE = (0.2125, 0.7154, 0.0721)
 _OPTION = re.compile(
     rb"-[A-Za-z]\w*(?:[ \t]+(?:[+-]?[\d.]\S*|on|off|[rgbmlz](?=[ \t])|\w+_\w+))+[ \t]+"
 )
@@ -150,14 +147,13 @@ def number(line: Line) -> float:
     return value
 
 
-def luminance(line: Line) -> float:
-    """Return the luminance of a colour such as Ks; NaN if it is not one or three numbers."""
+def colour(line: Line) -> tuple[float, ...]:
+    """Return a colour such as Ks; empty if it is not one or three numbers."""
     words = line.value.split()
     if len(words) not in (1, 3) or not all(map(_NUMBER.match, words)):
-        return math.nan
+        return ()
     # A single number stands for all three.
-    colour = [float(word) for word in words] * (3 // len(words))
-    return math.fsum(weight * part for weight, part in zip(_LUMINANCE, colour, strict=True))
+    return tuple(float(word) for word in words) * (3 // len(words))
 
 
 def comments(lines: Iterable[Line]) -> list[tuple[int, str]]:

@@ -16,6 +16,13 @@ _HEADINGS = {
     "rmse": "RMSE", "rmse_unchanged": "kept", "notes": "notes",
 }  # fmt: skip
 
+_FROM = option(
+    "MDF:ENCODING",
+    "What every alpha of the scenes is, such as ggx:roughness, if an exporter stored that "
+    "there; if not given, the distribution says it.",
+    "--from",
+    words=completion.endpoints,
+)
 _TO = option(
     "MDF", "Distribution to convert to: ggx or beckmann.", words=completion.mitsuba_targets
 )
@@ -27,6 +34,7 @@ def command(
     context: typer.Context,
     scenes: Annotated[list[str], argument("IN.xml...", "Scenes, or patterns such as '*.xml'.")],
     output: material_files.ResultOption = None,
+    source: Annotated[str | None, _FROM] = None,
     to: Annotated[str, _TO] = "ggx",
     metric: options.MetricOption = "environment",
     exposure: options.ExposureOption = None,
@@ -38,15 +46,18 @@ def command(
 ) -> None:
     """Convert the distribution of rough BSDFs in Mitsuba scenes (0.6 and 3).
 
-    Changes distribution and alpha of roughconductor, roughdielectric, roughplastic and
+    Changes distribution and alpha of roughconductor, roughdielectric, roughplastic, pplastic and
     roughcoating, or adds them where their defaults count; every other byte is kept. What has to
-    be left as it is, such as a textured alpha, is reported, and the exit status is 1.
+    be left as it is, such as a textured alpha or the BSDFs phong and ward, is reported, and the
+    exit status is 1.
 
     Examples:
 
     mdfconv mitsuba scene.xml -o scene-ggx.xml
 
     mdfconv mitsuba --in-place --to beckmann --metric display 'scenes/*.xml'
+
+    mdfconv mitsuba exported.xml -o scene.xml --from ggx:roughness
 
     mdfconv mitsuba scene.xml -o out --textures --compare --format json
     """
@@ -55,6 +66,8 @@ def command(
     from mdfconv.scene.texture.rule import TextureRule
 
     target = mitsuba.check_target(to)
+    # A mistake in the name is none of a file.
+    taken_for = options.asked_endpoint(source).label if source else None
     chosen = options.chosen_metric(metric, exposure)
 
     def convert(destination: Destination, data: bytes) -> mitsuba.MitsubaConversion:
@@ -67,7 +80,11 @@ def command(
 
         with material_files.about(destination.source):
             conversion = mitsuba.convert_mitsuba(
-                data, target, metric=chosen, texture=texture if textures else None
+                data,
+                target,
+                source=taken_for,
+                metric=chosen,
+                texture=texture if textures else None,
             )
         # A texture whose BSDF is left for another reason is not written.
         names = {texture.result for texture in conversion.textures}
@@ -85,9 +102,11 @@ def command(
         form=format_,
         metric=chosen,
         details=lambda conversion: {
+            "from": taken_for,
             "target": target,
             "textures": list(map(vars, conversion.textures)),
             "includes": [{"line": line, "file": file} for line, file in conversion.includes],
+            "notes": [{"line": line, "note": text} for line, text in conversion.notes],
         },
         headings=_HEADINGS,
         # With --compare 80 columns are too few for all.

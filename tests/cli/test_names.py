@@ -37,6 +37,7 @@ OPTIONS = {
     ("bench", "--reference"): ("--quick", "--parameter", "0.2"),
     ("bench", "--from"): ("--quick", "--to", "beckmann"),
     ("bench", "--to"): ("--quick",),
+    ("mitsuba", "--from"): ("in.xml", "-o", "out.xml"),
     ("mitsuba", "--to"): ("in.xml", "-o", "out.xml"),
     ("furnace", "--brdf"): ("0.2", "--points", "3"),
 }

@@ -8,13 +8,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
 import mdfconv
 from mdfconv.conversion.explanation import remaining_error
-from mdfconv.distributions.endpoint import endpoints
+from mdfconv.distributions.endpoint import endpoint, endpoints, stored_forms
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.scene import convert_mitsuba
 from tests.cli.runner import run, run_on_terminal
@@ -198,6 +198,159 @@ def test_axes_are_converted_one_by_one(names, distribution, pair, source):
         ].rmse
         for a in material.value
     )
+
+
+def test_polarized_plastic_is_converted_like_its_kin():
+    data = scene(rough(text("beckmann"), number(0.2), kind="pplastic"), rough(kind="pplastic"))
+    found = convert_mitsuba(data)
+    assert not found.problems
+    first, default = (values for _, values in properties(found.data))
+    assert first["distribution"] == default["distribution"] == "ggx"
+    # Minimum of the squared difference over the sphere of normals, found independently.
+    assert float(first["alpha"]) == pytest.approx(0.156212, abs=5e-7)
+    assert float(default["alpha"]) == pytest.approx(0.1 * CONSTANT, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("given", "nearest"),
+    [
+        (number(0.2), [("alpha", 0.2)]),
+        ("", [("alpha", 0.1)]),
+        (number(0.2, "alphaU") + number(0.3, "alphaV"), [("alpha_u", 0.2), ("alpha_v", 0.3)]),
+        (number(0.2, "alpha_u") + number(0.3), [("alpha_u", 0.2), ("alpha_v", 0.3)]),
+        (number(0.2, "alphaV"), [("alpha_u", 0.1), ("alpha_v", 0.2)]),
+        (number(0.2) + text("ward-duer", "variant"), [("alpha", 0.2)]),
+        (number(0.2, "alphaU") + '<ref name="alphaV" id="t"/>', [("alpha_u", 0.2)]),
+        (number("x"), []),
+    ],
+)
+@pytest.mark.parametrize("target", ["ggx", "beckmann"])
+def test_the_nearest_to_ward_is_named(given, nearest, target):
+    data = scene(rough(given, kind="ward"), version="0.6.0")
+    found = convert_mitsuba(data, target)
+    assert (found.data, found.materials) == (data, ())
+    ((_, problem, _),) = found.problems
+    factor = CONSTANT if target == "ggx" else 1
+    words = [
+        f"{name} {alpha:g} is nearest to {target} with alpha {alpha * factor:.6g}"
+        for name, alpha in nearest
+    ]
+    lobe = "the BSDF ward has Ward's lobe, near that of beckmann but not equal"
+    assert problem == "; ".join([lobe, *words])
+
+
+def test_what_is_left_of_other_plugins_is_said():
+    data = scene(
+        rough(number(0.3), kind="sssbrdf"),
+        *(rough(number(0.3, "roughness"), kind=k) for k in ("principled", "mine", "principled")),
+        rough(number(0.3), kind="roughdiffuse"),
+        rough(number(0.3, "sigmaA"), kind="coating"),
+        rough(number(0.3, "reflectance"), kind="diffuse"),
+        rough(number(0.3, "specular_roughness"), number(0.3, "coat_roughness"), kind="layers"),
+    )
+    found = convert_mitsuba(data)
+    assert found.data == data
+    assert [problem.text for problem in found.problems] == [
+        "the BSDF sssbrdf is of no type that is converted: its alpha",
+        "the BSDF mine is of no type that is converted: its roughness",
+        "the BSDF layers is of no type that is converted: its specular_roughness and "
+        "coat_roughness",
+    ]
+    assert found.notes == (
+        (2, "the roughness of principled is that of GGX already"),
+        (2, "the roughness of roughdiffuse is Oren-Nayar's, of no microfacet distribution"),
+    )
+
+
+STORED = [
+    end.label
+    for owner in mdfconv.list_distributions()
+    if owner.name != "ashikhmin-shirley"  # which is only one for pairs
+    for end in [endpoint(owner.name), *(form for form, _ in stored_forms(owner))]
+]
+
+
+@settings(deadline=None)
+@given(st.sampled_from(STORED), st.floats(0, 1), st.sampled_from(["beckmann", "ggx", None]))
+def test_a_number_that_an_exporter_stored_is_read_as_what_it_is(name, share, distribution):
+    end = endpoint(name)
+    low, high = end.distribution.parameter.typical
+    parameter = low * (high / low) ** share
+    stored = float(end.encode(np.array(parameter)))
+    assume(not any(which for which in end.clamped(np.array(stored)).values()))
+    assume(not math.isnan(stored))
+    named = text(distribution) if distribution else ""
+    data = scene(rough(named, number(repr(stored))))
+    found = convert_mitsuba(data, source=name)
+    assert not found.problems
+    ((_, values),) = properties(found.data)
+    assert values["distribution"] == "ggx"
+    wanted = parameter
+    if end.distribution.name != "ggx":
+        wanted = mdfconv.convert(parameter, end.distribution.name, "ggx", metric="environment")
+    assert float(values["alpha"]) == pytest.approx(wanted, rel=1e-6)
+    assert found.materials[0].distribution == name
+    (note,) = found.notes
+    assert note[1].startswith(f"alpha is taken for {name}")
+
+
+def test_a_stored_roughness_counts_whatever_the_distribution_says():
+    data = scene(
+        rough(text("ggx"), number(0.5)),
+        "\n",
+        rough(text("beckmann"), number(0.5, "alpha_u"), number(0.25, "alpha_v")),
+        "\n",
+        rough(kind="roughplastic"),
+        rough(text("ggx"), number(0)),
+        rough(number(0.5), kind="ward"),
+        rough(number(50, "exponent"), kind="phong"),
+        version="0.6.0",
+    )
+    found = convert_mitsuba(data, source="ggx:roughness")
+    (_, one), (_, two), (_, default), *_ = properties(found.data)
+    assert (one["distribution"], one["alpha"]) == ("ggx", "0.25")
+    assert (two["distribution"], two["alpha_u"], two["alpha_v"]) == ("ggx", "0.25", "0.0625")
+    # Nobody stored it: it is Mitsuba's, and Beckmann's.
+    assert float(default["alpha"]) == pytest.approx(0.1 * CONSTANT, rel=1e-8)
+    assert found.materials[2].distribution == "beckmann"
+    mirror, ward, phong = (problem.text for problem in found.problems)
+    assert mirror == "alpha 0 of ggx:roughness is a mirror"
+    assert "alpha 0.5 is nearest to ggx with alpha 0.25" in ward
+    assert "exponent 50 is nearest to ggx" in phong
+    assert found.notes == (
+        (2, "alpha is taken for ggx:roughness (α = r²), whatever the distribution says"),
+    )
+    for source, target, alpha in (("ggx", "ggx", "0.5"), ("beckmann", "ggx", f"{0.5 * CONSTANT}")):
+        again = convert_mitsuba(data, target, source=source)
+        assert properties(again.data)[0][1]["alpha"].startswith(alpha[:8])
+        assert {v.get("distribution") for _, v in properties(again.data)[:2]} == {target}
+
+
+def test_a_clamped_number_has_no_inverse():
+    found = convert_mitsuba(scene(rough(number(0))), source="blinn-phong:obj2gltf")
+    assert found.problems[0].text == (
+        "alpha 0 of blinn-phong:obj2gltf has no inverse: r = 0 is any N ≥ 1000"
+    )
+
+
+def test_texels_are_what_the_exporter_stored(tmp_path):
+    texels = np.array([[0, 51, 128, 255]], np.uint8)
+    Image.fromarray(texels).save(tmp_path / "wood.png")
+    (tmp_path / "a.xml").write_bytes(scene(rough(text("ggx"), texture("wood.png"))))
+    status, out, err = run(
+        "mitsuba", "a.xml", "-o", "b.xml", "--textures", "--from", "ggx:roughness",
+        "--format", "json", cwd=tmp_path,
+    )  # fmt: skip
+    assert status == 0
+    note = "alpha is taken for ggx:roughness (α = r²), whatever the distribution says"
+    assert f"note: a.xml, line 2: {note}" in err
+    got = np.asarray(Image.open(tmp_path / "wood_ggx.png"))[0].tolist()
+    # 255 (v/255)² by hand.
+    assert got == [0, 10, 64, 255]
+    (record,) = json.loads(out)
+    assert (record["from"], record["target"]) == ("ggx:roughness", "ggx")
+    assert record["textures"][0]["distribution"] == "ggx:roughness"
+    assert record["notes"] == [{"line": 2, "note": note}]
 
 
 def test_nested_and_referenced_bsdfs_are_converted_once():
@@ -595,6 +748,9 @@ def test_includes_are_told_about_and_not_read(tmp_path):
         (["--to", "phong"], "Mitsuba knows ggx and beckmann (0.6 also phong and as)"),
         (["--to", "gtr"], "Mitsuba knows ggx and beckmann (0.6 also phong and as)"),
         (["--metric", "lihgt"], "unknown metric"),
+        (["--from", "ggx:rufness"], "unknown encoding of ggx 'rufness'"),
+        (["--from", "ashikhmin-shirley"], "ashikhmin-shirley"),
+        (["--from", "blinn-phong:vtk-gltf"], "as in blinn-phong:vtk-gltf:0.5"),
         (["bad.xml"], "bad.xml: not well-formed XML, line 1"),
     ],
 )

@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mdfconv.distributions import distribution
-from mdfconv.distributions.endpoint import endpoint
+from mdfconv.distributions.endpoint import endpoint, one_parameter_endpoint
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.solve import errors_of_many
 from mdfconv.scene.material_files import FileConversion
-from mdfconv.scene.mitsuba.scene import DISTRIBUTIONS, PHONG_EXPONENT, TARGETS, Bsdf, MitsubaScene
+from mdfconv.scene.mitsuba.scene import DISTRIBUTIONS, TARGETS, Bsdf, MitsubaScene
 from mdfconv.scene.mitsuba.xml_edit import Element, XmlEdits, attribute_text
 from mdfconv.scene.stored import ConvertedNumber, MaterialProblem, Outcome, StoredConverter
 
@@ -40,7 +40,7 @@ class MitsubaMaterial:
     line : int
         Its line, counted from 1.
     distribution : str
-        The one it had, in Mitsuba's words.
+        The one it had, in Mitsuba's words, or what its α was taken for.
     value, result : float or tuple of two floats
         α before and after, of both axes if it has two; NaN of a texture.
     rmse : float
@@ -115,6 +115,7 @@ def convert_mitsuba(
     data: bytes,
     target: str = "ggx",
     *,
+    source: str | None = None,
     metric: str | Metric = "environment",
     texture: TextureConversion | None = None,
 ) -> MitsubaConversion:
@@ -126,6 +127,10 @@ def convert_mitsuba(
         The scene, XML in UTF-8. Whatever is not converted is kept.
     target : str
         ``"ggx"`` or ``"beckmann"``. 0.6's phong and as (Ashikhmin-Shirley) are converted, too.
+    source : str, optional
+        What every α that the scene gives is, such as ``"ggx:roughness"``, whatever its
+        distribution says: for exporters that store another number there. An α that is not given
+        is Mitsuba's own. If not given, the distributions say it.
     metric : str or Metric
         What the fit keeps; renderers use normalized distributions in scenes with light from all
         around, so by default that. The axes of an anisotropic BSDF are converted one by one.
@@ -141,17 +146,18 @@ def convert_mitsuba(
     Raises
     ------
     MdfconvError
-        If the target or the metric is not known, or the file is not XML that can be read: not
-        well-formed, not in UTF-8, with declared entities, or nested more than 1000 levels deep.
+        If the target, the source or the metric is not known, or the file is not XML that can be
+        read: not well-formed, not in UTF-8, with declared entities, or nested more than 1000
+        levels deep.
     """
     target = check_target(target)
     metric = metric_named(metric)
-    scene = MitsubaScene(data)
-    pending = [bsdf for bsdf in scene.bsdfs if not bsdf.problem and bsdf.distribution != target]
+    scene = MitsubaScene(data, one_parameter_endpoint(source).label if source else "")
+    pending = [bsdf for bsdf in scene.bsdfs if not bsdf.problem and not bsdf.is_already(target)]
     numbers = _numbers(((bsdf.source, bsdf.numbers) for bsdf in pending), target, metric)
-    tables = {source: each.table() for source, each in numbers.items()}
+    tables = {name: each.table() for name, each in numbers.items()}
     for bsdf in pending:
-        bsdf.problem = _number_problem(bsdf, tables[bsdf.source], target)
+        bsdf.problem = _number_problem(bsdf, numbers[bsdf.source], tables[bsdf.source], target)
     scene.leave_what_others_use(pending)
     bitmaps = _convert_bitmaps(scene, pending, texture)
     # What shares something with a BSDF whose bitmap cannot be converted.
@@ -161,7 +167,7 @@ def convert_mitsuba(
     textures: dict[Element, MitsubaTexture] = {}
     for bsdf in [bsdf for bsdf in scene.bsdfs if not bsdf.problem]:
         # Those without a table have the target's distribution already.
-        table = tables[bsdf.source] if bsdf.distribution != target else None
+        table = None if bsdf.is_already(target) else tables[bsdf.source]
         materials.append(_material(bsdf, table))
         if table is None:
             continue
@@ -177,7 +183,21 @@ def convert_mitsuba(
         named=scene.named,
         includes=tuple((each.line, each.get("filename")) for each in scene.includes),
         problems=tuple(MaterialProblem(bsdf.element.line, bsdf.problem) for bsdf in left),
+        notes=tuple(_notes(scene, source)),
     )
+
+
+def _notes(scene: MitsubaScene, source: str | None) -> Iterator[tuple[int, str]]:
+    """Yield what there is to know of a scene as a whole, with the lines."""
+    taken = [bsdf for bsdf in scene.bsdfs if bsdf.taken_for and not bsdf.other_lobe]
+    if taken and source:
+        end = endpoint(source)
+        rule = f" ({end.encoding.formula})" if end.encoding else ""
+        yield (
+            taken[0].element.line,
+            f"alpha is taken for {end.label}{rule}, whatever the distribution says",
+        )
+    yield from ((element.line, text) for element, text in scene.right_already)
 
 
 def check_target(name: str) -> str:
@@ -234,6 +254,15 @@ class _Numbers:
         parameters = replace(self._source, encoding=None)
         self._convert = StoredConverter(parameters, endpoint(target), metric, uniform_below=0)
 
+    def refusal(self, value: float) -> str:
+        """Return why a number that is not legal is not converted."""
+        limits = self._source.stored
+        for text, which in self._source.clamped(np.array([value])).items():
+            if which.any():
+                return f"has no inverse: {text}"
+        smoothest = limits.upper if limits.larger_is_smoother else limits.lower
+        return "is a mirror" if value == smoothest else "is out of range"
+
     def table(self) -> dict[float, ConvertedNumber]:
         """Return what becomes of the legal ones."""
         table = self._convert.table(self._parameter)
@@ -250,20 +279,23 @@ class _Numbers:
         return dict(zip(self._stored, rmse.tolist(), strict=True))
 
 
-def _number_problem(bsdf: Bsdf, table: Mapping[float, ConvertedNumber], target: str) -> str:
+def _number_problem(
+    bsdf: Bsdf, numbers: _Numbers, table: Mapping[float, ConvertedNumber], target: str
+) -> str:
     """Return why a number of a BSDF is not converted, "" if it is."""
-    phong = bsdf.source == PHONG_EXPONENT
-    problem = "the BSDF phong has no microfacets" if phong else ""
-    for value in bsdf.numbers:
-        number = table.get(value)
+    nearest = bsdf.other_lobe
+    for each in bsdf.roughness:
+        if each.value is None:
+            continue
+        number = table.get(each.value)
         converted = number is not None and number.outcome is Outcome.CONVERTED
-        if phong and converted:
-            alpha = f"{table[value].result:.6g}"
-            problem += f"; exponent {value:g} is nearest to {target} with alpha {alpha}"
-        elif not phong and not converted:
-            why = f"has no answer in {target}" if number else "is out of range"
-            return f"alpha {value:g} of {bsdf.distribution} {why if value else 'is a mirror'}"
-    return problem
+        if bsdf.other_lobe and converted:
+            alpha = f"{table[each.value].result:.6g}"
+            nearest += f"; {each.name} {each.value:g} is nearest to {target} with alpha {alpha}"
+        elif not bsdf.other_lobe and not converted:
+            why = f"has no counterpart in {target}" if number else numbers.refusal(each.value)
+            return f"alpha {each.value:g} of {bsdf.meaning} {why}"
+    return nearest
 
 
 def _convert_bitmaps(
@@ -279,7 +311,7 @@ def _convert_bitmaps(
                 if convert is None:
                     raise MdfconvError(f"alpha is the texture {file}")
                 name = convert(file, bsdf.source)
-                bitmaps[holder] = MitsubaTexture(file, name, bsdf.distribution, place.line)
+                bitmaps[holder] = MitsubaTexture(file, name, bsdf.meaning, place.line)
         except MdfconvError as error:
             bsdf.problem = str(error)
     return bitmaps
@@ -298,15 +330,17 @@ def _material(bsdf: Bsdf, table: Mapping[float, ConvertedNumber] | None) -> Mits
         notes = [f"parameter {x}: convert what -D gives it, too" for x in parameters]
     notes += ["default α" for each in bsdf.roughness if each.holder is None]
     place, pair = (bsdf.name, bsdf.element.line), (_value(values), _value(results))
-    return MitsubaMaterial(*place, bsdf.distribution, *pair, rmse, tuple(dict.fromkeys(notes)))
+    return MitsubaMaterial(*place, bsdf.meaning, *pair, rmse, tuple(dict.fromkeys(notes)))
 
 
 def _edit(edits: XmlEdits, bsdf: Bsdf, target: str, results: Sequence[float]) -> None:
     """Give a BSDF the target's distribution, and new numbers for its α; NaN of a texture."""
     new: list[tuple[str, str, str]] = []
-    if bsdf.named_by is not None:
+    if bsdf.distribution == target:
+        pass  # its numbers were others
+    elif bsdf.named_by is not None:
         edits.set_value(bsdf.named_by, target.encode())
-    else:  # it is the default, and not the target
+    else:  # it is the default
         new.append(("string", "distribution", target))
     for each, result in zip(bsdf.roughness, results, strict=True):
         number = f"{result:.{_DIGITS}g}"

@@ -2,7 +2,8 @@
 
 Mitsuba 0.6 (src/bsdfs/microfacet.h) and Mitsuba 3 (include/mitsuba/render/microfacet.h) take the
 same properties: ``distribution``, which is beckmann if not given, and ``alpha``, 0.1 if not given,
-or both ``alpha_u`` and ``alpha_v`` (0.6: ``alphaU`` and ``alphaV``).
+or both ``alpha_u`` and ``alpha_v`` (0.6: ``alphaU`` and ``alphaV``). The plugins without such a
+distribution that have a roughness all the same are in src/bsdfs of either.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from mdfconv.errors import MdfconvError
 from mdfconv.scene.mitsuba.xml_edit import Element, read_elements
@@ -20,11 +22,42 @@ _EXPONENT = "blinn-phong:mitsuba-phong"
 DISTRIBUTIONS = {"beckmann": "beckmann", "ggx": "ggx", "phong": _EXPONENT, "as": _EXPONENT}
 TARGETS = ("ggx", "beckmann")
 _DEFAULT_DISTRIBUTION, _DEFAULT_ALPHA = "beckmann", 0.1
-# The plugin phong of 0.6, which has no microfacets: the exponent is of the reflected ray.
-PHONG, PHONG_EXPONENT, _DEFAULT_EXPONENT = "phong", "blinn-phong:reflected", 30.0
-
-_TYPES = {"roughconductor", "roughdielectric", "roughplastic", "roughcoating", PHONG}
 _AXES = ("alpha_u", "alpha_v")
+
+_TYPES = {"roughconductor", "roughdielectric", "roughplastic", "roughcoating", "pplastic"}
+
+
+class _OtherLobe(NamedTuple):
+    """A plugin whose lobe is none of Mitsuba's distributions, with the nearest that there is."""
+
+    words: str
+    # What its number is nearest to, its name, and what counts where none is given.
+    nearest: str
+    number: str
+    default: float
+
+
+# The plugins of 0.6: the exponent of phong is of the reflected ray; the exponential of ward is that
+# of Beckmann's distribution, its factors are not.
+_OTHER_LOBES = {
+    "phong": _OtherLobe(
+        "the BSDF phong has no microfacets", "blinn-phong:reflected", "exponent", 30.0
+    ),
+    "ward": _OtherLobe(
+        "the BSDF ward has Ward's lobe, near that of beckmann but not equal",
+        "beckmann", "alpha", _DEFAULT_ALPHA,
+    ),
+}  # fmt: skip
+# Whose roughness these have, which is right as it is.
+_RIGHT_ALREADY = dict.fromkeys(
+    ("principled", "principledthin", "disney", "openpbr"), "that of GGX already"
+)
+_RIGHT_ALREADY |= {
+    "roughdiffuse": "Oren-Nayar's, of no microfacet distribution",
+    "hair": "that of fibres, of no microfacet distribution",
+}
+# What a plugin that is not known calls a roughness.
+_ROUGHNESS_NAME = re.compile(r"alpha_?[a-z]?\Z|.*(roughness|glossiness|shininess|exponent)\Z", re.I)
 # By the names of 0.6, too, which Mitsuba 3 reads in older scenes.
 _PROPERTIES = {"alphaU": "alpha_u", "alphaV": "alpha_v"}
 _PROPERTIES |= {name: name for name in ("distribution", "alpha", *_AXES)}
@@ -48,12 +81,15 @@ class Roughness:
         The parameter's name, "" if it is none.
     textured : bool
         Whether the holder is a texture.
+    name : str
+        What the scene calls it.
     """
 
     value: float | None
     holder: Element | None = None
     parameter: str = ""
     textured: bool = False
+    name: str = "alpha"
 
 
 @dataclass(eq=False)
@@ -65,13 +101,18 @@ class Bsdf:
     element : Element
         Where it stands.
     distribution : str
-        One of `DISTRIBUTIONS`; of the plugin phong `PHONG_EXPONENT`.
+        One of `DISTRIBUTIONS`.
     named_by : Element or None
         The property that names the distribution; None if it is not given.
     roughness : tuple of Roughness
         One, or those of both axes.
     problem : str
         Why it is left as it is, "" if it is not.
+    taken_for : str
+        What its numbers are whatever the distribution says, as `mdfconv.convert` names it; "" if
+        the distribution says it.
+    other_lobe : str
+        In words which lobe it has that is none of `DISTRIBUTIONS`; "" if it has one of them.
     """
 
     element: Element
@@ -79,6 +120,8 @@ class Bsdf:
     named_by: Element | None = None
     roughness: tuple[Roughness, ...] = ()
     problem: str = ""
+    taken_for: str = ""
+    other_lobe: str = ""
 
     @property
     def name(self) -> str:
@@ -88,7 +131,16 @@ class Bsdf:
     @property
     def source(self) -> str:
         """What its α or its exponent is, as `mdfconv.convert` names it."""
-        return DISTRIBUTIONS.get(self.distribution, self.distribution)
+        return self.taken_for or DISTRIBUTIONS[self.distribution]
+
+    @property
+    def meaning(self) -> str:
+        """What its α is in Mitsuba's words, unless it was taken for something else."""
+        return self.taken_for or self.distribution
+
+    def is_already(self, target: str) -> bool:
+        """Return whether it has a distribution, and its numbers are those of it."""
+        return not self.other_lobe and self.distribution == self.source == target
 
     @property
     def numbers(self) -> list[float]:
@@ -108,6 +160,9 @@ class MitsubaScene:
     ----------
     data : bytes
         The scene.
+    taken_for : str
+        What every number that is given as α is, whatever the distribution says, as
+        `mdfconv.convert` names it; "" if the distributions say it.
 
     Attributes
     ----------
@@ -115,6 +170,8 @@ class MitsubaScene:
         The first number of the version, 0 for Mitsuba 0.6; None if there is none.
     bsdfs : list of Bsdf
         Those with a roughness, in order; what cannot be converted has a problem.
+    right_already : list of (Element, str)
+        The first BSDF of each type whose roughness is right as it is, and in words whose it is.
     includes : list of Element
         What stands in other files.
     named : list of str
@@ -128,7 +185,8 @@ class MitsubaScene:
         As `read_elements`.
     """
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: bytes, taken_for: str = "") -> None:
+        self._taken_for = taken_for
         elements = read_elements(data)
         by_tag: defaultdict[str, list[Element]] = defaultdict(list)
         for element in elements:
@@ -157,11 +215,27 @@ class MitsubaScene:
             values = (value for each in elements for value in each.attributes.values())
             used = Counter(name for value in values for name in _PARAMETER.findall(value))
             self.uses.update({each: used[name] for name, each in self._defaults.items()})
-        self.bsdfs = [self._bsdf(each) for each in by_tag["bsdf"] if each.get("type") in _TYPES]
+        bsdfs = (self._bsdf(each) for each in by_tag["bsdf"])
+        self.bsdfs = [bsdf for bsdf in bsdfs if bsdf]
+        first = {each.get("type"): each for each in reversed(by_tag["bsdf"])}
+        self.right_already = [
+            (first[kind], f"the roughness of {kind} is {whose}")
+            for kind, whose in _RIGHT_ALREADY.items()
+            if kind in first
+        ]
 
-    def _bsdf(self, element: Element) -> Bsdf:
-        if element.get("type") == PHONG:
-            return Bsdf(element, PHONG_EXPONENT, roughness=(self._phong_exponent(element),))
+    def _bsdf(self, element: Element) -> Bsdf | None:
+        """Return a BSDF whose roughness is to be looked at, None for others."""
+        kind = element.get("type")
+        if kind in _OTHER_LOBES:
+            return self._of_another_lobe(element, _OTHER_LOBES[kind])
+        if kind not in _TYPES:
+            given = (child.get("name") for child in element.children)
+            rough = " and ".join(filter(_ROUGHNESS_NAME.match, given))
+            if kind in _RIGHT_ALREADY or not rough:
+                return None
+            problem = f"the BSDF {kind} is of no type that is converted: its {rough}"
+            return Bsdf(element, problem=problem)
         bsdf = Bsdf(element)
         try:
             alphas = _properties(element)
@@ -173,20 +247,29 @@ class MitsubaScene:
                 raise MdfconvError(f"{names}: neither alpha alone nor alpha_u and alpha_v")
             bsdf.roughness = tuple([self._roughness(alphas[name]) for name in sorted(alphas)])
             if not alphas:
+                # That of Mitsuba, whatever the numbers are that the scene gives.
                 bsdf.roughness = (Roughness(_DEFAULT_ALPHA),)
+            else:
+                bsdf.taken_for = self._taken_for
         except MdfconvError as refusal:
             bsdf.problem = str(refusal)
         return bsdf
 
-    def _phong_exponent(self, element: Element) -> Roughness:
-        """Return the exponent of the plugin phong."""
-        for child in element.children:
-            if child.get("name") == "exponent":
-                try:
-                    return Roughness(self._roughness(child).value)
-                except MdfconvError:
-                    return Roughness(None)
-        return Roughness(_DEFAULT_EXPONENT)
+    def _of_another_lobe(self, element: Element, lobe: _OtherLobe) -> Bsdf:
+        """Return a BSDF that is left, with its numbers, of which the nearest is named."""
+        names = ((child.get("name"), child) for child in element.children)
+        given = {_PROPERTIES.get(name, name): child for name, child in names}
+        alphas = given.keys() & {"alpha", *_AXES} if lobe.number == "alpha" else set()
+        roughness = []
+        for name in _AXES if alphas & set(_AXES) else (lobe.number,):
+            holder = given.get(name, given.get(lobe.number))
+            try:
+                value = lobe.default if holder is None else self._roughness(holder).value
+            except MdfconvError:
+                value = None
+            roughness.append(Roughness(value, name=name))
+        taken_for = (self._taken_for if alphas else "") or lobe.nearest
+        return Bsdf(element, roughness=tuple(roughness), taken_for=taken_for, other_lobe=lobe.words)
 
     def _distribution(self, element: Element) -> str:
         written = element.get("value")

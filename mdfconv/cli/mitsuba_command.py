@@ -40,6 +40,7 @@ def command(
     exposure: options.ExposureOption = None,
     in_place: material_files.InPlaceOption = False,
     force: options.ForceOption = False,
+    dry_run: options.DryRunOption = False,
     textures: Annotated[bool, _TEXTURES] = False,
     compare: Annotated[bool, _COMPARE] = False,
     format_: material_files.ReportFormatOption = "table",
@@ -102,7 +103,7 @@ def command(
         form=format_,
         metric=chosen,
         details=lambda conversion: {
-            "from": taken_for,
+            **({"from": taken_for} if taken_for else {}),
             "target": target,
             "textures": list(map(vars, conversion.textures)),
             "includes": [{"line": line, "file": file} for line, file in conversion.includes],
@@ -115,7 +116,7 @@ def command(
         print_more=_print_more,
     )
     material_files.convert_files(
-        context, scenes, output, convert, report, in_place=in_place, force=force
+        context, scenes, output, convert, report, in_place=in_place, force=force, dry_run=dry_run
     )
 
 

@@ -735,6 +735,17 @@ def test_several_files_in_place_keep_the_originals(tmp_path):
     assert (tmp_path / "b.xml.bak").read_bytes() == BEFORE
 
 
+def test_a_dry_run_reports_and_writes_nothing(tmp_path):
+    (tmp_path / "a.xml").write_bytes(BEFORE)
+    status, out, err = run("mitsuba", "a.xml", "--dry-run", "--format", "json", cwd=tmp_path)
+    assert status == 0
+    assert [row["result"] for row in json.loads(out)[0]["materials"]] == pytest.approx(
+        [alpha * CONSTANT for alpha in (0.2, 0.1, 0.3)], rel=1e-9
+    )
+    assert "would write" in err
+    assert [path.name for path in tmp_path.iterdir()] == ["a.xml"]
+
+
 def test_includes_are_told_about_and_not_read(tmp_path):
     (tmp_path / "a.xml").write_bytes(scene(rough(number(0.2)), '<include filename="none.xml"/>'))
     status, _, err = run("mitsuba", "a.xml", "-o", "b.xml", cwd=tmp_path)

@@ -166,6 +166,8 @@ class MitsubaScene:
 
     Attributes
     ----------
+    root : str
+        The name of its outermost element.
     version : int or None
         The first number of the version, 0 for Mitsuba 0.6; None if there is none.
     bsdfs : list of Bsdf
@@ -191,6 +193,7 @@ class MitsubaScene:
         by_tag: defaultdict[str, list[Element]] = defaultdict(list)
         for element in elements:
             by_tag[element.tag].append(element)
+        self.root = elements[0].tag
         version = re.match(r"\s*(\d{1,9})\b", elements[0].get("version"))
         self.version = int(version[1]) if version else None
         self.includes = by_tag["include"]

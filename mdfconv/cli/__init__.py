@@ -24,10 +24,12 @@ from mdfconv.registry import unknown_name
 
 # As the help shows them: what is asked every day first.
 _PANELS = {
-    "Commands": ("convert", "mtl", "gltf", "mitsuba", "texture", "formula", "fit", "list"),
+    "Commands": (
+        "convert", "inspect", "mtl", "gltf", "mitsuba", "texture", "formula", "fit", "list",
+    ),
     "Studies": ("fit-table", "plot-error", "compare", "light", "furnace", "fresnel", "report"),
     "Audits": ("bench", "stability", "recommend"),
-}
+}  # fmt: skip
 _COMMANDS = {name: panel for panel, names in _PANELS.items() for name in names}
 
 # A value may be negative, which looks like an option: `_Command` sorts out the real typos.

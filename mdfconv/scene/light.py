@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -33,16 +33,18 @@ class LightReport:
     ----------
     spectrum : Spectrum
         C_l.
-    softness : float
-        Where its exponent lies between that of a sun, 0, and of an overcast sky, 1.
     conversions : list of dict
         A row for each m_B: ``m_b``, α of the best GGX under the ``light``, the ``ratio`` of
         the two, and that α under each of `METRICS`.
     """
 
     spectrum: Spectrum
-    softness: float
-    conversions: list[dict[str, float]]
+    conversions: list[dict[str, float]] = field(default_factory=list)
+
+    @property
+    def softness(self) -> float:
+        """Where its exponent lies between that of a sun, 0, and of an overcast sky, 1."""
+        return float(np.clip((self.spectrum.exponent - SUN) / (OVERCAST - SUN), 0, 1))
 
     @property
     def sentence(self) -> str:
@@ -93,8 +95,7 @@ def light_report(path: str | Path, m_b: Sequence[float]) -> LightReport:
     columns["ratio"] = columns["light"] / parameter
     shown = "m_b", "light", "ratio", *METRICS
     rows = zip(*(columns[name].tolist() for name in shown), strict=True)
-    softness = float(np.clip((spectrum.exponent - SUN) / (OVERCAST - SUN), 0, 1))
-    return LightReport(spectrum, softness, [dict(zip(shown, row, strict=True)) for row in rows])
+    return LightReport(spectrum, [dict(zip(shown, row, strict=True)) for row in rows])
 
 
 _GUIDES = ((0.0, "a sun: l⁰", ":"), (2.0, "nature: l⁻²", "--"))

@@ -92,12 +92,12 @@ TIFF = PictureForm(
 TGA = PictureForm("TGA", "targa", (".tga",), (), ("Y", "RGB", "RGBA"), headers.tga_reason)
 EXR = PictureForm("OpenEXR", "openexr", (".exr",), (b"\x76\x2f\x31\x01",))
 JPEG = PictureForm("JPEG", "jpeg", (".jpg", ".jpeg"), (b"\xff\xd8\xff",))
-_FORMS = (PNG, TIFF, TGA, EXR, JPEG)
+FORMS = (PNG, TIFF, TGA, EXR, JPEG)
 
 
 def _form_named(path: Path) -> PictureForm | None:
     """Return the form that a file's name says."""
-    return next((form for form in _FORMS if path.suffix.lower() in form.endings), None)
+    return next((form for form in FORMS if path.suffix.lower() in form.endings), None)
 
 
 def pictures_in(folder: Path) -> list[Path]:
@@ -128,7 +128,7 @@ def check_files(
     source: PictureFile, output: PictureFile, *, lossy: bool = False
 ) -> tuple[PictureForm, PictureForm]:
     """Return the forms of two files; refuse those between which no texture can go."""
-    form = _form_of(source)
+    form = form_of(source)
     new_form = _form_named(output.path)
     if form is JPEG and not lossy:
         raise MdfconvError(
@@ -150,11 +150,11 @@ def check_files(
     return form, new_form
 
 
-def _form_of(source: PictureFile) -> PictureForm:
+def form_of(source: PictureFile) -> PictureForm:
     """Return the form of a file's content, if its name does not say another."""
     with reading(source), source.path.open("rb") as file:
         start = file.read(HEAD_BYTES)
-    form = next((form for form in _FORMS if start.startswith(form.signatures)), None)
+    form = next((form for form in FORMS if start.startswith(form.signatures)), None)
     if form is None:
         refuse_foreign(source, start)
     named = _form_named(source.path)

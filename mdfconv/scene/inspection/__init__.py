@@ -1,0 +1,1 @@
+"""What files are, what their numbers mean, and what converts them."""

@@ -44,7 +44,7 @@ def command(
 ) -> None:
     """Say what files are, what their numbers mean, and what converts them; write nothing.
 
-    For material libraries, Mitsuba scenes, textures, environment maps and measurements:
+    For material libraries, glTF, Mitsuba scenes, textures, environment maps and measurements:
     who wrote a file, each number with the exponent N, the α of the nearest GGX and its roughness
     r, what has no conversion, and the command line that converts it. The exit status is 1 if
     something has no conversion, 2 if a file cannot be read.

@@ -42,7 +42,7 @@ SAME = [
     "mtl {0}/a.mtl --compare -o {1}/a.mtl",
     "gltf {0}/a.gltf --from blinn-phong:obj2gltf --compare -o {1}/a.gltf",
     "mitsuba {0}/a.xml --compare -o {1}/a.xml",
-    "inspect {0}/a.mtl {0}/a.xml",
+    "inspect {0}/a.mtl {0}/a.gltf {0}/a.xml",
     "inspect {0}/lobe.csv {0}/map.exr {0}/two.csv",
     "formula --from beckmann --to ggx --all",
     "formula --from blinn-phong --to ggx:roughness --all --lang latex",

@@ -1,10 +1,12 @@
 """`mdfconv inspect`: every kind of file is named, its numbers are right, and its lines run."""
 
+import base64
 import io
 import json
 import math
 import re
 import shlex
+import struct
 import zipfile
 from pathlib import Path
 
@@ -15,6 +17,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+import mdfconv
 from mdfconv.output.kinds import FOREIGN
 from mdfconv.scene.inspection.files import inspect_file, list_kinds
 from mdfconv.scene.inspection.records import FileInspection
@@ -135,6 +138,102 @@ def test_an_authored_roughness_and_textures_of_a_library_are_said(tmp_path):
     assert "cannot read no.png" in missing["problem"]
     assert "decimal comma" in comma["problem"]
     assert record["command"] == "mdfconv mtl a.mtl -o a-ggx.mtl --textures"
+
+
+def gltf(*materials, generator="", **more):
+    asset = {"version": "2.0"} | ({"generator": generator} if generator else {})
+    return json.dumps({"asset": asset, "materials": materials} | more).encode()
+
+
+def of_factor(factor, **more):
+    return {"pbrMetallicRoughness": {"roughnessFactor": factor} | more}
+
+
+def glb(data):
+    data += b" " * (-len(data) % 4)
+    head = struct.pack("<4sII", b"glTF", 2, 20 + len(data))
+    return head + struct.pack("<I4s", len(data), b"JSON") + data
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_a_gltf_has_its_generator_and_what_its_factors_mean(binary, tmp_path):
+    data = gltf(of_factor(0.7), generator="obj2gltf")
+    path = tmp_path / ("a.glb" if binary else "a.gltf")
+    path.write_bytes(glb(data) if binary else data)
+    record = inspected(path)
+    assert record["kind"] == ("GLB (glTF 2.0)" if binary else "glTF 2.0")
+    assert record["writer"] == "obj2gltf"
+    assert "blinn-phong:obj2gltf" in record["taken_for"]
+    (number,) = record["numbers"]
+    assert (number["place"], number["quantity"]) == ("materials[0]", "roughnessFactor")
+    assert number["exponent"] == pytest.approx(300, rel=1e-12)
+    wanted = mdfconv.convert(300, "blinn-phong", "ggx:roughness", metric="environment")
+    assert number["roughness"] == pytest.approx(wanted, rel=1e-9)
+    assert record["command"] == f"mdfconv gltf {path.name} -o {path.stem}-ggx{path.suffix}"
+
+
+def test_a_gltf_of_another_writer_is_what_gltf_defines(tmp_path):
+    (tmp_path / "a.gltf").write_bytes(gltf(of_factor(0.5), generator="my own"))
+    record = inspected(tmp_path / "a.gltf")
+    assert (record["numbers"][0]["alpha"], record["numbers"][0]["exponent"]) == (0.25, None)
+    assert (record["command"], record["repaired"]) == ("", "")
+    assert "ggx:roughness" in record["taken_for"]
+
+
+def test_a_rule_that_depends_on_a_weight_is_read_for_a_weight_of_1(tmp_path):
+    (tmp_path / "a.gltf").write_bytes(gltf(of_factor(0.5), generator="assimp v5.2"))
+    record = inspected(tmp_path / "a.gltf")
+    assert record["writer"] == "assimp v5.2"
+    assert record["numbers"][0]["taken_for"] == "blinn-phong:assimp-gltf"
+    # With L = 1, r = 1 − √(N/1000).
+    assert record["numbers"][0]["exponent"] == pytest.approx(250, rel=1e-9)
+    assert record["command"].endswith("--specular L")
+
+
+def test_a_condition_on_the_writer_is_a_note(tmp_path):
+    (tmp_path / "a.gltf").write_bytes(gltf(of_factor(0.5), generator="Khronos glTF Blender I/O"))
+    record = inspected(tmp_path / "a.gltf")
+    assert record["numbers"][0]["alpha"] == 0.25
+    assert "blinn-phong:blender-obj if its materials came from" in record["notes"][0]
+    assert record["command"] == ""
+
+
+def test_a_glossiness_is_read_and_moves(tmp_path):
+    material = of_factor(0.3) | {
+        "extensions": {"KHR_materials_pbrSpecularGlossiness": {"glossinessFactor": 0.6}}
+    }
+    (tmp_path / "a.gltf").write_bytes(gltf(material))
+    record = inspected(tmp_path / "a.gltf")
+    rough, glossy = record["numbers"]
+    assert (rough["quantity"], glossy["quantity"]) == ("roughnessFactor", "glossinessFactor")
+    assert rough["alpha"] == pytest.approx(0.09)
+    assert (glossy["stored"], glossy["alpha"]) == (0.6, pytest.approx(0.16))
+    assert record["command"].endswith("--from ggx:gltf-glossiness")
+
+
+def test_textures_of_a_gltf_are_described_wherever_they_are(tmp_path):
+    write_png(tmp_path / "orm.png", np.zeros((2, 4, 3), np.uint8))
+    Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(tmp_path / "orm.jpg")
+    uri = "data:image/png;base64," + base64.b64encode((tmp_path / "orm.png").read_bytes()).decode()
+    materials = [of_factor(1, metallicRoughnessTexture={"index": at}) for at in (0, 1, 2, 3, 0)]
+    data = gltf(
+        *materials,
+        generator="FBX2glTF",
+        textures=[{"source": at} for at in range(4)],
+        images=[{"uri": "orm.png"}, {"uri": uri, "name": "in"}, {"uri": "orm.jpg"}, {"uri": "no"}],
+    )
+    (tmp_path / "a.gltf").write_bytes(data)
+    record = inspected(tmp_path / "a.gltf", status=1)
+    assert [(each["file"], each["place"], each["form"]) for each in record["textures"]] == [
+        ("orm.png", "materials[0]", "PNG"),
+        ("images[1]", "materials[1]", "PNG"),
+        ("orm.jpg", "materials[2]", "JPEG"),
+    ]
+    assert {each["channel"] for each in record["textures"]} == {"g"}
+    assert [each["lossy"] for each in record["textures"]] == [False, False, True]
+    assert record["problems"][0]["place"] == "materials[3]"
+    words = record["command"].split()
+    assert {"--textures", "--lossy"} <= set(words)
 
 
 @pytest.mark.parametrize(
@@ -280,6 +379,9 @@ def test_a_cube_map_is_named(tmp_path):
         ("a.xml", b"<scene>\n<bsdf>\n</scene>", "not well-formed XML, line 3"),
         ("a.xml", b"<svg/>", "it is no scene: its root is svg"),
         ("a.hdr", b"#?RADIANCE\n", ""),
+        ("a.gltf", b'{"asset": {"version": "1.0"}}', "is glTF of version 1.0, not 2.0"),
+        ("a.gltf", b"{", "no JSON"),
+        ("a.glb", b"glTF\2\0\0\0", "is a GLB of 8 bytes"),
         ("a.obj", b"mtllib a.mtl\nv 0 0 0\n", "is a model, not a material library"),
         ("a.csv", b"words\nand\nmore\nof\nthem\n", "not numbers"),
         ("empty.mtl", b"", "it has no bytes"),
@@ -296,6 +398,7 @@ def write_all(folder):
     """Write a file of each kind that is read; return those by their kinds."""
     write_map(folder / "room.exr", room())
     (folder / "b.mtl").write_text("newmtl a\nNs 100\n")
+    (folder / "c.glb").write_bytes(glb(gltf(of_factor(0.7), generator="obj2gltf")))
     write_png(folder / "gloss.png", np.zeros((2, 4, 1), np.uint8))
     (folder / "a.xml").write_bytes(scene('<bsdf type="roughplastic"/>', version="3.0.0"))
     (folder / "lobe.csv").write_text(LOBE)
@@ -313,6 +416,7 @@ def test_every_line_runs_and_what_it_makes_is_done(tmp_path):
         assert words[0] == "mdfconv"
         status, _, err = run(*words[1:], cwd=tmp_path)
         assert status == 0, err
+        # What a glTF is after a repair nothing says, unless it is marked.
         if words[1] in ("mitsuba", "mtl"):
             again = inspected(tmp_path / words[words.index("-o") + 1])
             assert again["command"] == ""
@@ -322,6 +426,11 @@ def test_a_converted_file_is_said_to_look_repaired(tmp_path):
     (tmp_path / "a.mtl").write_text("newmtl a\nNs 100\n")
     assert run("mtl", "a.mtl", "-o", "b.mtl", cwd=tmp_path)[0] == 0
     assert inspected(tmp_path / "b.mtl")["repaired"] == "every Ns has its Pr already"
+    (tmp_path / "a.glb").write_bytes(glb(gltf(of_factor(0.7), generator="obj2gltf")))
+    assert run("gltf", "--mark", "a.glb", "-o", "b.glb", cwd=tmp_path)[0] == 0
+    record = inspected(tmp_path / "b.glb")
+    assert "marked as converted" in record["repaired"]
+    assert record["command"] == ""
     (tmp_path / "a.xml").write_bytes(scene('<bsdf type="roughplastic"/>'))
     assert inspected(tmp_path / "a.xml")["repaired"] == ""
     assert run("mitsuba", "--in-place", "a.xml", cwd=tmp_path)[0] == 0
@@ -386,7 +495,7 @@ def test_json_has_the_same_keys_for_every_kind(tmp_path):
     status, out, _ = run("inspect", "*", "no", "--format", "json", cwd=tmp_path)
     assert status == 2
     records = json.loads(out)
-    assert len(records) == 8
+    assert len(records) == 9
     assert all(record.keys() == KEYS for record in records)
 
 
@@ -408,7 +517,7 @@ def test_text_fits_80_columns_and_breaks_no_word(tmp_path):
     # What is continued in the next line is one command for a shell.
     commands = re.findall(r"\$ (mdfconv (?:.*\\\n)*.*)", narrow)
     assert {shlex.split(line)[1] for line in commands} == {
-        "light", "texture", "mitsuba", "fit", "mtl",
+        "light", "texture", "mitsuba", "fit", "mtl", "gltf",
     }  # fmt: skip
 
 

@@ -22,6 +22,8 @@ from mdfconv.measured.readers.tables import parse_table
 from mdfconv.measured.samples import Measurements, Samples
 from mdfconv.output.files import find_files
 from mdfconv.output.kinds import foreign
+from mdfconv.scene.gltf.document import is_glb
+from mdfconv.scene.inspection.gltf import inspect_gltf
 from mdfconv.scene.inspection.materials import inspect_library, inspect_scene
 from mdfconv.scene.inspection.pictures import inspect_light, inspect_picture
 from mdfconv.scene.inspection.records import FileInspection, NextStep, unread
@@ -143,6 +145,11 @@ def _is_table(name: str, head: bytes) -> bool:
     return True
 
 
+def _is_gltf(name: str, head: bytes) -> bool:
+    """Return whether a file is a GLB, or JSON with what every glTF has."""
+    return is_glb(head) or (head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"{" and b'"asset"' in head)
+
+
 def _inspect_measurements(path: Path) -> FileInspection:
     """Return what a file of measurements is."""
     with path.open("rb") as file:
@@ -204,6 +211,7 @@ _KINDS = (
         lambda name, head: any(head.startswith(form.signatures) for form in images.FORMS),
         tuple(ending for form in images.FORMS for ending in form.endings),
     ),
+    _Kind("glTF", inspect_gltf, _is_gltf, (".gltf", ".glb")),
     _Kind("Mitsuba scene", inspect_scene, _by_text(r"<scene[\s>]"), (".xml",)),
     _Kind("measurements", _inspect_measurements, _is_measured),
     _Kind(

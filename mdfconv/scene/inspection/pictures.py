@@ -6,6 +6,7 @@ import re
 from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from mdfconv.distributions.endpoint import encodings_of
 from mdfconv.errors import MdfconvError
@@ -48,6 +49,14 @@ def _picture_of(source: PictureFile, channel: str | None) -> InspectedTexture:
         if lossy or error.argument != "lossy":
             raise
         return _opened(source, form, channel, lossy=True)
+
+
+def picture_of_bytes(data: bytes, suffix: str, channel: str) -> InspectedTexture:
+    """Return the size, the depth and the channels of a picture within another file."""
+    with TemporaryDirectory() as folder:
+        source = PictureFile(Path(folder) / f"texture{suffix}", "the texture")
+        source.path.write_bytes(data)
+        return _picture_of(source, channel)
 
 
 def picture_beside(path: Path, file: str) -> InspectedTexture:

@@ -91,6 +91,7 @@ def files_of_recipes(folder):
     texels = np.linspace(20, 250, 64).astype(np.uint8).reshape(8, 8)
     for name in ("gloss.png", "glossiness.png"):
         Image.fromarray(texels).save(folder / name)
+    Image.fromarray(np.stack([texels] * 4, axis=-1), "RGBA").save(folder / "unity.png")
     (folder / "kitchen.xml").write_text(
         '<scene version="3.0.0"><bsdf type="roughconductor">'
         '<float name="alpha" value="0.2"/></bsdf></scene>\n'

@@ -16,6 +16,7 @@ from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
 from mdfconv.scene.shininess import SHININESS, fit_error, roughness_of
+from mdfconv.scene.stored import UNIFORM_BELOW
 
 AUTO = "auto"
 # Numbers have six decimals in libraries, and were single-precision before.
@@ -87,8 +88,8 @@ class NsMeaning:
             roughness = np.clip(dialect.roughness(encoding.encode(numbers)), 0, 1)
             return np.full_like(numbers, np.nan), roughness, np.zeros_like(numbers)
         exponent = self.end.encoding.decode(numbers) if self.end.encoding else numbers
-        # A rounded number may be a little below the exponent 0.
-        exponent = np.maximum(exponent, 0)
+        # A rounded number may be a little beside the exponent 0.
+        exponent = np.where(exponent < UNIFORM_BELOW, 0, exponent)
         return exponent, roughness_of(exponent, metric), fit_error(exponent, metric)
 
 

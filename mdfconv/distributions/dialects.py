@@ -375,6 +375,8 @@ _TO_MIRROR = (Clamp(0.0, 0.0),)
 _GGX_ROUGHNESS = "ggx:roughness"
 # A roughness is set with three digits at most.
 _ROUGHNESS_STEP = 0.001
+# Of exporters from 2.80 on: without a version, or with one such as "4.0.0 Alpha".
+_BLENDER_HEADER = r"# (?P<name>Blender)(?: v?(?P<version>\d[\d.]*)[^':]*?)? MTL File"
 # From 2.80 on Blender writes 1, or the metallic that is not 0.
 _BLACK_AMBIENT = r"Ka 0\.0+ 0\.0+ 0\.0+\s"
 
@@ -384,7 +386,7 @@ DIALECTS = (
         "Blender 2.80 to 3.2, OBJ export", "io_scene_obj/export_obj.py; obj_export_mtl.cc",
         clamps=_TO_MIRROR, roughness=same, texels=_GGX_ROUGHNESS,
         library=LibraryNumbers(
-            "Ns = 900 (1 − r)²", r"# (?P<name>Blender)(?: (?P<version>[\d.]+))? MTL File",
+            "Ns = 900 (1 − r)²", _BLENDER_HEADER,
             _ROUGHNESS_STEP, before=(3, 3), never=_BLACK_AMBIENT,
         ),
     ),
@@ -395,7 +397,7 @@ DIALECTS = (
         clamps=_TO_MIRROR, roughness=same, generators=("blender i/o", "khronos blender"),
         provided="if its materials came from a Wavefront OBJ", texels=_GGX_ROUGHNESS,
         library=LibraryNumbers(
-            "Ns = 1000 (1 − r)²", r"# (?P<name>Blender)(?: (?P<version>[\d.]+))? MTL File",
+            "Ns = 1000 (1 − r)²", _BLENDER_HEADER,
             _ROUGHNESS_STEP, never=_BLACK_AMBIENT,
         ),
     ),

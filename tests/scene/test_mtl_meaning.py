@@ -42,6 +42,8 @@ def library(header, numbers):
         ("# Blender 3.3.1 MTL File: 'None'", "250.000000", "blender-obj", 0.5),
         ("# Blender 3.1.0 MTL File: 'None'", "225.000000", "blender-2.8", 0.5),
         ("# Blender 3.2.2 MTL File: 'None'", "250.000000", "blender-obj", 0.5),
+        ("# Blender 5.0.0 Alpha MTL File: 'x'", "250.000000", "blender-obj", 0.5),
+        ("# Blender v2.93.1 MTL File", "225.000000", "blender-2.8", 0.5),
         (PYTHON, "225.000000", "blender-2.8", 0.5),
         (PYTHON, "323.999994", "blender-2.8", 0.4),
         (PYTHON, "359.999993", "blender-obj", 0.4),

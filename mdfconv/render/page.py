@@ -42,6 +42,7 @@ _CONVERTED_ERROR = 2e-4
 _STORED_ERROR = 3e-4, 5e-6
 # Nodes of ln p to begin with; at a jump they are no nearer to each other than this.
 _NODES = 65
+_FORM_NODES = 17
 _NARROWEST_STEP = 1e-6
 # Parameters at which the error that remains is shown.
 _ERROR_NODES = 33
@@ -104,7 +105,7 @@ def page_data(source: Endpoint, target: Endpoint, start: float | None = None) ->
         "target": _end(target) | _lobes(last, *span),
         "metrics": tables,
         "interpolation": float(f"{error:.2g}"),
-        "encodings": _encodings(last, *span),
+        "forms": _forms(last, *span),
         "lights": [_light(name, LIGHTS[name], first) for name in LIGHTS.names],
         "environment": _environment(),
         "curves": _curves(),
@@ -250,38 +251,38 @@ def _lobes(mdf: Distribution, low: float, high: float) -> dict[str, Any]:
     }
 
 
-def _encodings(mdf: Distribution, low: float, high: float) -> dict[str, Any]:
+def _forms(mdf: Distribution, low: float, high: float) -> list[dict[str, Any]]:
     """Return the forms in which the parameter is stored, over a range of it.
 
     Their ``values`` are those at ``nodes``, ln p, between which they are interpolated linearly, and
-    NaN where the parameter cannot be stored.
+    NaN where the parameter cannot be stored. The first is the parameter itself, which is at hand.
     """
-    ends = [Endpoint(mdf), *(end for end, _ in stored_forms(mdf))]
-    encoded = [end for end in ends if end.encoding]
-    limits = [clamp.limit for end in ends if end.encoding for clamp in end.encoding.clamps]
+    return [
+        {
+            "name": end.label,
+            "symbol": end.stored.symbol,
+            "formula": end.encoding.formula if end.encoding else "",
+            "clamped": "; ".join(end.clamped(np.empty(0))),
+        }
+        | _tabulated(end, low, high)
+        for end in (Endpoint(mdf), *(end for end, _ in stored_forms(mdf)))
+    ]
+
+
+def _tabulated(end: Endpoint, low: float, high: float) -> dict[str, str]:
+    """Return a stored form in as few steps of ln p as it takes."""
+    if not end.encoding:
+        return {"nodes": "", "values": ""}
+    limits = [clamp.limit for clamp in end.encoding.clamps]
     beside = [limit * (1 + side) for limit in limits for side in (-_BESIDE_CLAMP, 0, _BESIDE_CLAMP)]
     inside = [value for value in beside if low < value < high]
-    nodes = np.log(np.unique(np.concatenate([_grid(low, high, _NODES), inside])))
+    start = np.log(np.unique(np.concatenate([_grid(low, high, _FORM_NODES), inside])))
 
     def stored(logs: Array) -> Array:
-        return np.array([end.encode(np.exp(logs)) for end in encoded])
+        return end.encode(np.exp(logs))[None]
 
-    if encoded:
-        nodes, _, _ = _refined(stored, nodes, *_STORED_ERROR)
-    return {
-        "nodes": _packed(nodes, np.float64),
-        "forms": [
-            {
-                "name": end.label,
-                "symbol": end.stored.symbol,
-                "formula": end.encoding.formula if end.encoding else "",
-                "clamped": "; ".join(end.clamped(np.empty(0))),
-                # The parameter itself is at hand.
-                "values": _packed(end.encode(np.exp(nodes)), np.float32) if end.encoding else "",
-            }
-            for end in ends
-        ],
-    }
+    nodes, values, _ = _refined(stored, start, *_STORED_ERROR)
+    return {"nodes": _packed(nodes, np.float64), "values": _packed(values[0], np.float32)}
 
 
 def _light(name: str, light: Lights, source: Distribution) -> dict[str, Any]:

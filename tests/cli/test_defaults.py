@@ -33,8 +33,10 @@ def test_the_same_shininess_has_one_roughness_in_every_command(tmp_path):
         "ggx:roughness", cwd=tmp_path,
     )  # fmt: skip
     assert (status, err) == (
-        0, "mdfconv: wrote out.png: ggx:roughness, keeps the light of a natural environment\n",
-    )  # fmt: skip
+        0,
+        "mdfconv: wrote out.png: blinn-phong:exponent to ggx:roughness, "
+        "keeps the light of a natural environment\n",
+    )
     texel = np.asarray(Image.open(tmp_path / "out.png"))[0, 0] / 65535
     assert texel == pytest.approx(wanted, abs=2e-5)
     code = run("formula", *PAIR, "--lang", "python", "--tolerance", "1e-4")[1]

@@ -89,9 +89,9 @@ def test_every_metric_is_interpolated_well(data, pair):
 
 
 def test_every_form_is_interpolated_well(data):
-    nodes = unpacked(data["encodings"]["nodes"], "<f8")
     logs = np.log(random_parameters(data["target"]))
-    for form in data["encodings"]["forms"][1:]:
+    for form in data["forms"][1:]:
+        nodes = unpacked(form["nodes"], "<f8")
         expected = endpoint(form["name"]).encode(np.exp(logs))
         ours = np.interp(logs, nodes, unpacked(form["values"], "<f4"))
         both = ~(np.isnan(ours) | np.isnan(expected))
@@ -131,7 +131,7 @@ def hostile_page():
     data = page_data(endpoint("beckmann"), endpoint("ggx"))
     data["title"] = data["source"]["label"] = data["target"]["label"] = HOSTILE
     data["metrics"][0]["keeps"] = HOSTILE
-    data["lights"][0]["label"] = data["encodings"]["forms"][0]["name"] = HOSTILE
+    data["lights"][0]["label"] = data["forms"][0]["name"] = HOSTILE
     return filled(data).decode(), data
 
 

@@ -226,9 +226,9 @@ def convert_files(
     inputs = *files, *report.metric.inputs
 
     def check(paths: Iterable[Path], inputs: Sequence[Path]) -> None:
-        # A dry run may name what cannot be written.
-        if not dry_run:
-            Outputs(*paths, force=force, inputs=inputs)
+        # A dry run does not create the folder.
+        there = [path for path in paths if not dry_run or path.parent.is_dir()]
+        Outputs(*there, force=force, inputs=inputs)
 
     if output and material_files.is_folder(output) and not dry_run:
         new_folder(context, Path(output))
@@ -245,7 +245,9 @@ def convert_files(
     written = material_files.write_conversions(converted, force=force, dry_run=dry_run)
     report.print([(destination, conversion) for destination, _, conversion in converted])
     for destination, _, conversion in converted:
-        if destination in written:
+        if dry_run and output is None and not in_place:
+            tell(f"{destination.source}: nothing is written in a dry run")
+        elif destination in written:
             _tell_written(destination, conversion, "would write" if dry_run else "wrote")
         else:
             tell(f"nothing to change in {destination.output}")

@@ -85,7 +85,7 @@ def command(
     if to != "roughness":
         if compare or textures:
             raise MdfconvError("--compare and --textures go with --to roughness")
-        options.refuse_given(context, ["source", "overwrite"], "goes with --to roughness")
+        options.refuse_given(context, ["overwrite"], "goes with --to roughness")
     if not textures:
         options.refuse_given(context, ["texels", "exponent_max"], "goes with --textures")
     chosen = options.chosen_metric(metric, exposure)

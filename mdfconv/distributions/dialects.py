@@ -414,7 +414,7 @@ DIALECTS = (
         ),
     ),
     Dialect(
-        "obj2gltf", _PHONG, "r = 1 − N/1000, times 1 − L below L = 0.1",
+        "obj2gltf", _PHONG, "r = 1 − N/1000, for L < 0.1 times (1 − L)",
         lambda r, weight: 1000 * (1 - r / _obj2gltf(weight)),
         lambda n, weight: np.maximum(1 - n / 1000, 0) * _obj2gltf(weight),
         "CesiumGS obj2gltf", "lib/loadMtl.js",

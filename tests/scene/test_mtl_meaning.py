@@ -194,7 +194,10 @@ def test_a_picture_of_roughness_keeps_its_file(tmp_path):
         "mtl", "a.mtl", "-o", "b.mtl", "--textures", "--format", "json", cwd=tmp_path
     )
     assert status == 0, err
-    assert json.loads(out)[0]["texels"] == "ggx:roughness"
+    (record,) = json.loads(out)
+    assert record["texels"] == "ggx:roughness"
+    assert record["materials"][0]["roughness"] == 1
+    assert record["materials"][0]["notes"] == ["Pr 1, as map_Pr has the roughness"]
     # The map has the whole roughness: readers multiply it by Pr.
     assert (tmp_path / "b.mtl").read_text() == (
         text.replace("Ns 250\n", "Ns 250\nPr 1\n") + "map_Pr -s 2 2 1 rough.png\n"
@@ -225,7 +228,6 @@ def test_unknown_texels_are_left_until_they_are_named(tmp_path):
         (["--textures", "--texels", "ggx:rough"], "did you mean roughness"),
         (["--textures", "--texels", "blinn-phong"], "needs an encoding"),
         (["--from", "ggx"], "Ns of a library is not stored as ggx"),
-        (["--to", "shininess", "--from", "blinn-phong"], "--from goes with --to roughness"),
         (["--to", "shininess", "--overwrite-authored"], "goes with --to roughness"),
     ],
 )
@@ -264,13 +266,41 @@ def test_importers_are_compared_with_what_the_author_meant(tmp_path):
 
 def test_a_dry_run_writes_nothing(tmp_path):
     (tmp_path / "a.mtl").write_bytes(AUTHORED)
-    for words in ([], ["-o", "b.mtl"], ["-o", "new/"], ["--in-place"], ["-o", "a.mtl"]):
+    for words in ([], ["-o", "b.mtl"], ["-o", "new/"], ["--in-place"]):
         status, out, err = run("mtl", "a.mtl", "--dry-run", *words, cwd=tmp_path)
         assert (status, out) == (1, "")
-        assert "mdfconv: would write " in err
+        assert ("mdfconv: would write " if words else "nothing is written in a dry run") in err
         assert "0.331488" in err
         assert [path.name for path in tmp_path.iterdir()] == ["a.mtl"]
     assert (tmp_path / "a.mtl").read_bytes() == AUTHORED
+    # What would be refused is.
+    status, _, err = run("mtl", "a.mtl", "--dry-run", "-o", "a.mtl", "--force", cwd=tmp_path)
+    assert status == 2
+    assert "a.mtl is the input" in err
+
+
+@pytest.mark.parametrize("source", ["blender-obj", "blender-2.8", "blender-2.7"])
+def test_shininess_is_what_the_writer_of_the_library_means(source):
+    """There and back a library of Blender is the same, to the digits of Ns."""
+    authored = [50, 12, 200] if source == "blender-2.7" else [0.5, 0.25, 0.35]
+    numbers = [WRITTEN[source](each) for each in authored]
+    there = convert_mtl(library(HEADERS[source], numbers), metric="energy")
+    back = convert_mtl(there.data, "shininess", metric="energy")
+    assert back.source == f"blinn-phong:{source}"
+    wanted = [float(number) for number in numbers]
+    assert [each.shininess for each in back.materials] == pytest.approx(wanted, rel=1e-6)
+    # And on request an exponent.
+    other = convert_mtl(there.data, "shininess", source="blinn-phong", metric="energy")
+    assert other.materials[0].shininess == pytest.approx(
+        mdfconv.convert(
+            there.materials[0].roughness, "ggx:roughness", "blinn-phong", metric="energy"
+        ),
+        rel=0.1,
+    )
+
+
+def test_a_number_that_a_program_cannot_write_is_of_another():
+    assert convert_mtl(library(PYTHON, ["950"])).source == "blinn-phong:blender-obj"
 
 
 def test_the_table_says_what_ns_was_taken_for(tmp_path):

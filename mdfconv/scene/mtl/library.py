@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -11,14 +12,14 @@ from math import isclose
 
 import numpy as np
 
-from mdfconv.distributions.endpoint import endpoint, texels_of
+from mdfconv.distributions.endpoint import texels_of
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.material_files import FileConversion, TextureFolder
 from mdfconv.scene.mtl import statements
 from mdfconv.scene.mtl.meaning import AUTO, NsMeaning, asked_meaning, likely_meaning
 from mdfconv.scene.mtl.statements import Line, MaterialBlock
-from mdfconv.scene.shininess import ROUGHNESS, SHININESS, exponent_of, fit_error, luminance
+from mdfconv.scene.shininess import ROUGHNESS, SHININESS, luminance
 from mdfconv.scene.stored import UNIFORM_BELOW, MaterialProblem, ProblemKind
 from mdfconv.scene.texture.convert import Progress
 from mdfconv.scene.texture.rule import TextureRule
@@ -31,7 +32,6 @@ _DIGITS = {b"Pr": 8, b"Ns": 6}
 # A Pr that is so near to what would be written is that.
 _SAME = 1e-6
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
-_EXPONENT = NsMeaning(endpoint(SHININESS), "", "")
 # What a texture of exponents holds, as a share of the largest.
 TEXTURE_EXPONENT = f"{SHININESS}:exponent"
 _ROUGHEST_HARDNESS = -1.960784
@@ -152,9 +152,9 @@ def convert_mtl(
         ``"roughness"``: each material with an Ns gets the Pr of the GGX (α = Pr²) that fits
         best. ``"shininess"``: each with a Pr gets the Ns whose best GGX that is.
     source : str
-        What Ns is, towards roughness: ``"blinn-phong"`` for an exponent, or what a program made
-        of one, such as ``"blinn-phong:blender-obj"``. By default the header and the numbers of the
-        library say who wrote it, and without such a header it is an exponent.
+        What Ns is, or becomes: ``"blinn-phong"`` for an exponent, or what a program made of one,
+        such as ``"blinn-phong:blender-obj"``. By default the header and the numbers of the library
+        say who wrote it, and without such a header it is an exponent.
     metric : str or Metric
         What the fit keeps; readers of Pr use normalized distributions in scenes with light
         from all around, so by default that.
@@ -182,7 +182,7 @@ def convert_mtl(
         raise MdfconvError(f"a library is converted to roughness or shininess, not to '{to}'")
     keyword, target = _KEYWORDS[To(to)]
     lines, blocks = _read(data)
-    meaning = _meaning(data, lines, blocks, source) if target == b"Pr" else _EXPONENT
+    meaning = _meaning(data, lines, blocks, source)
     sources, problems = _sources(blocks, keyword, meaning)
     materials = _converted(sources, to, metric_named(metric), meaning)
     edit = _Edit(keyword, target, replace, overwrite, texture_names)
@@ -230,19 +230,21 @@ class _Edit:
                 text = f"{authored.shown} is authored, {gives}"
                 problems.append(MaterialProblem(authored.number, text, ProblemKind.AUTHORED))
                 continue
+            mapped = self.target == b"Pr" and self._names(source.block)
+            if mapped and not authored:
+                # The map has the whole roughness, and readers multiply it by the number.
+                value, notes = b"1", (*material.notes, "Pr 1, as map_Pr has the roughness")
+                material = dataclasses.replace(material, roughness=1.0, rmse=np.nan, notes=notes)
             converted.append(material)
             if value and not authored:
-                self._set_number(source, value)
+                self._set_number(source, value, mapped=mapped)
         return converted, problems
 
-    def _set_number(self, source: _SourceLines, value: bytes) -> None:
-        block, roughness = source.block, self.target == b"Pr"
-        # A map has the whole roughness, and readers multiply it by the number.
-        mapped = roughness and self.texture_names is not None and self._names(block)
-        new = b"1" if mapped else value
-        _set(self.target, new, source.lines, block.having(self.target), replace=self.replace)
-        if roughness and self.overwrite and not mapped:
-            for line in block.having(b"map_Pr"):
+    def _set_number(self, source: _SourceLines, value: bytes, *, mapped: bool) -> None:
+        targets = source.block.having(self.target)
+        _set(self.target, value, source.lines, targets, replace=self.replace)
+        if self.target == b"Pr" and self.overwrite and not mapped:
+            for line in source.block.having(b"map_Pr"):
                 line.replacement = b""
 
     def set_textures(
@@ -343,8 +345,8 @@ def _converted(
         exponent, roughness, rmse = meaning.converted(values, metric)
         shininess = values
     else:
-        exponent = shininess = exponent_of(values, metric)
-        roughness, rmse = values, fit_error(exponent, metric)
+        shininess, exponent, rmse = meaning.of_roughness(values, metric)
+        roughness = values
     columns = (column.tolist() for column in (shininess, roughness, exponent, rmse))
     rows = list(zip(*columns, strict=True))
     return [_material(each, *rows[at]) for each, at in zip(sources, index.tolist(), strict=True)]
@@ -356,7 +358,10 @@ def _material(
     remarks = {
         f"Ns {shininess:g} is no highlight: Pr 1": exponent < UNIFORM_BELOW,
         "Ns beyond 10000": exponent > _LARGEST_USUAL,
-        "Pr 0 is a mirror, which has no exponent: nothing written": np.isnan(shininess),
+        "Pr 0 is a mirror, which has no exponent: nothing written": np.isnan(shininess)
+        and roughness == 0,
+        "beyond what the writer of the library stores: nothing written": np.isnan(shininess)
+        and roughness > 0,
         f"{len(source.lines)} statements: the last counts": len(source.lines) > 1,
     }
     notes = tuple(text for text, holds in remarks.items() if holds)

@@ -15,7 +15,7 @@ from mdfconv.distributions.evaluation import Array, Mask
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
-from mdfconv.scene.shininess import SHININESS, fit_error, roughness_of
+from mdfconv.scene.shininess import SHININESS, exponent_of, fit_error, roughness_of
 from mdfconv.scene.stored import UNIFORM_BELOW
 
 AUTO = "auto"
@@ -92,6 +92,26 @@ class NsMeaning:
         exponent = np.where(exponent < UNIFORM_BELOW, 0, exponent)
         return exponent, roughness_of(exponent, metric), fit_error(exponent, metric)
 
+    def of_roughness(self, roughness: Array, metric: Metric) -> tuple[Array, Array, Array]:
+        """Return the Ns for each Pr, the exponents and their errors, as `converted` has them.
+
+        NaN is what has none: a mirror of an exponent.
+        """
+        if self.is_roughness:
+            encoding, dialect = self.end.encoding, self.dialect
+            assert encoding is not None
+            assert dialect is not None
+            assert dialect.roughness is not None
+            # A roughness is stored as itself or as 1 − it: the way back is the same.
+            with np.errstate(divide="ignore"):
+                shininess = encoding.decode(dialect.roughness(roughness))
+            shininess = np.where(np.isfinite(shininess), shininess, np.nan)
+            return shininess, np.full_like(roughness, np.nan), np.zeros_like(roughness)
+        exponent = exponent_of(roughness, metric)
+        shininess = self.end.encoding.encode(exponent) if self.end.encoding else exponent
+        shininess = np.where(self.accepts(shininess) | (exponent == 0), shininess, np.nan)
+        return shininess, exponent, fit_error(exponent, metric)
+
 
 def asked_meaning(name: str) -> NsMeaning:
     """Return what Ns is by a name such as ``"blinn-phong:blender-obj"``.
@@ -137,6 +157,9 @@ def likely_meaning(
 
 def _chosen(line: int, found: list[tuple[Dialect, re.Match[str]]], numbers: Array) -> NsMeaning:
     """Return the meaning under which most numbers are such as authors set."""
+    # What cannot be of a program was not written by it.
+    possible = [each for each in found if _meaning_of(each[0]).accepts(numbers).all()]
+    found = possible or found
     match = found[0][1]
     version = (match.groupdict().get("version") or "").strip(".")
     writer = f"{match['name']} {version}".strip()
@@ -185,7 +208,11 @@ def _usual(dialect: Dialect, numbers: Array) -> Mask:
         written = write(authored, setting)
     tolerance = _LAST_DECIMAL + _SINGLE * np.sqrt(_LARGEST * np.abs(numbers))
     usual: Mask = np.abs(written - numbers) <= tolerance
-    return usual & NsMeaning(endpoint(f"{SHININESS}:{dialect.name}"), "", "").accepts(written)
+    return usual & _meaning_of(dialect).accepts(written)
+
+
+def _meaning_of(dialect: Dialect) -> NsMeaning:
+    return NsMeaning(endpoint(f"{SHININESS}:{dialect.example}"), "", "")
 
 
 def _differs(one: Dialect, other: Dialect, numbers: Array) -> bool:

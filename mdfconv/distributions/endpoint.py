@@ -112,11 +112,19 @@ class Endpoint:
 
     def axes(self, values: tuple[Any, ...]) -> tuple[Any, ...]:
         """Return what is stored for each axis by itself; raise if a second number is illegal."""
-        if not self.pairing or len(values) == 1:
+        if not (self.encoding and self.pairing) or len(values) == 1:
             return values
         first = np.asarray(self.stored.check(values[0], self.label), dtype=np.float64)
         second = np.asarray(self.pairing.second.check(values[1], self.label), dtype=np.float64)
         x, y = self.pairing.axes(first, second)
+        if not np.all(self.stored.accepts(x)):
+            alpha = float(np.max(self.encoding.decode(x)))
+            symbol = self.distribution.parameter.symbol
+            raise MdfconvError(
+                f"{self.label}: {symbol} along x would be {alpha:.4g}, outside "
+                f"{self.distribution.parameter.legal}",
+                f"a smaller {self.stored.name} or {self.pairing.second.name} has one",
+            )
         return _plain(x), _plain(y)
 
     def pair(self, x: Any, y: Any) -> tuple[Any, Any]:

@@ -194,7 +194,7 @@ def _exact_facts(relation: ExactRelation) -> list[str]:
         texts.append(_end_text(end, ", ".join(one.symbol for one in stored)))
         legal = (replace(one.parameter, symbol=one.symbol).legal for one in stored)
         ranges.append(ascii_text(", ".join(legal)))
-    facts = [f"{' to '.join(texts)}: exact, from {' to '.join(ranges)}."]
+    facts = [f"{' to '.join(texts)}: exact where {' and '.join(ranges)}."]
     if relation.is_pair:
         facts.append("The two axes of a surface; x is the rougher one.")
     for end in (relation.source, relation.target):

@@ -231,7 +231,7 @@ GLOSSINESS = {
 def test_a_glossiness_in_every_language(language):
     code = write_relation(relation_of(("ggx:glossiness", "ggx:roughness")), language)
     comments = [LANGUAGES[language].remark(text) for text in (
-        "ggx:glossiness g to ggx:roughness r: exact, from 0 <= g < 1 to 0 < r <= 1.",
+        "ggx:glossiness g to ggx:roughness r: exact where 0 <= g < 1 and 0 < r <= 1.",
         f"By mdfconv {mdfconv.__version__}.",
     )]  # fmt: skip
     wanted = GLOSSINESS[language].format("ggx_roughness_from_ggx_glossiness")
@@ -293,7 +293,8 @@ def test_the_comment_says_what_clamps():
     code = write_relation(relation_of(("blinn-phong:blender-obj", "blinn-phong:fbx")), "c")
     assert code.isascii()
     start = (
-        "// blinn-phong:blender-obj r to blinn-phong:fbx r: exact, from 0 <= r <= 1 to 0 <= r <= 1."
+        "// blinn-phong:blender-obj r to blinn-phong:fbx r: "
+        "exact where 0 <= r <= 1 and 0 <= r <= 1."
     )
     assert code.startswith(start)
     assert "// blinn-phong:blender-obj: r = 0 is any N >= 1000." in code

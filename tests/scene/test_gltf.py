@@ -672,7 +672,7 @@ def test_textures_by_the_command(tmp_path):
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        ([], "what wrote it; name what its numbers are; mdfconv inspect shows what the file has"),
+        ([], "what wrote it; name what its numbers are, if they are not glTF"),
         (["--from", "blinn-phong"], "a roughness factor is at most 1"),
         (["--from", "phong:obj3gltf"], "obj2gltf"),
         (["--from", OBJ2GLTF, "--to", "blinn-phong"], "a roughness factor is at most 1"),

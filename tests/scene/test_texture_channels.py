@@ -306,3 +306,20 @@ class TestAlphaOfTga:
     def test_is_alpha_once_something_goes_there(self, source):
         assert self.result(source, "b.tga", channel="g", to_channel="a")[17] & 0x0F == 8
         assert self.result(source, "c.tga", channel="a")[17] & 0x0F == 0
+
+
+def test_two_orientations_are_put_together_as_stored_and_said(tmp_path):
+    tag = Image.Exif()
+    tag[274] = 6
+    Image.new("L", (2, 2), 51).save(tmp_path / "gloss.png")
+    Image.new("RGB", (2, 2), (1, 2, 3)).save(tmp_path / "orm.png", exif=tag)
+    rule = TextureRule("ggx:glossiness", "ggx:roughness")
+    report = convert_texture_file(
+        tmp_path / "gloss.png",
+        tmp_path / "out.png",
+        rule,
+        to_channel="g",
+        into=tmp_path / "orm.png",
+    )
+    assert "has the orientation 1 and" in report.remarks[-1]
+    assert np.asarray(Image.open(tmp_path / "out.png"))[0, 0].tolist() == [1, 204, 3]

@@ -113,13 +113,15 @@ def convert_gltf(
     materials = repair.convert()
     if mark and materials:
         repair.mark()
+    encoded = document.encoded()
     return GltfConversion(
-        data=document.encoded(),
+        data=encoded,
         materials=tuple(materials),
         problems=tuple(problem for _, problem in sorted(repair.problems, key=itemgetter(0))),
         files=repair.files,
         inputs=repair.buffers.inputs,
-        named=document.named_files,
+        # Without the files that new ones have replaced.
+        named=(GltfDocument(encoded) if repair.files else document).named_files,
         generator=document.generator,
         source=ends.pair[0].label,
         target=ends.pair[1].label,
@@ -184,6 +186,7 @@ def source_by_generator(generator: str) -> str:
         f"{wrote}, which stands for {meant}"
         if found
         else f"{wrote}{', whose rule is not known' if generator else ''}",
-        "name what its numbers are; mdfconv inspect shows what the file has",
+        "name what its numbers are, if they are not glTF's own roughness; mdfconv inspect shows "
+        "them",
         argument="source",
     )

@@ -157,6 +157,15 @@ class ChannelMove:
                 argument="to_channel",
             )
 
+    def remarks(self) -> Iterator[str]:
+        """Yield what the user must know of how two pictures were put together."""
+        tags = self._source.orientation, self._base.orientation
+        if tags[0] != tags[1]:
+            yield (
+                f"{self._source.source} has the orientation {tags[0]} and {self._base.source} "
+                f"{tags[1]}: their texels were put together as they are stored"
+            )
+
     def __len__(self) -> int:
         return len(self._chosen.indices)
 

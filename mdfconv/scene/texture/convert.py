@@ -171,7 +171,7 @@ def convert_texture_file(
             for top, bottom in images.row_blocks(pictures, BLOCK):
                 write(move.rows(top, bottom, convert))
                 advance(bottom - top)
-        remarks = chain.from_iterable(picture.remarks(form) for picture in pictures)
+        remarks = chain(*(picture.remarks(form) for picture in pictures), move.remarks())
         return replace(convert.report(), channels=str(move), remarks=tuple(remarks))
 
 

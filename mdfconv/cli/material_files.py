@@ -270,11 +270,17 @@ def _check_choice(output: str | None, *, in_place: bool) -> None:
 
 
 def _tell_written(destination: Destination, conversion: FileConversion, verb: str) -> None:
-    """Say which files were written, and which of those that a result names it does not find."""
+    """Say which files were written, which a result no longer finds, and what was done before."""
     beside = [path for path in (destination.backup, *conversion.files) if path]
     for path in (destination.output, *beside):
         tell(f"{verb} {path}")
     _tell_missing(destination, conversion)
+    first = destination.source.with_name(f"{destination.source.name}.bak")
+    if destination.backup and destination.backup != first:
+        tell(
+            f"note: {destination.source} was converted in place before ({first} is there): its "
+            "numbers may be converted twice now"
+        )
 
 
 def _tell_missing(destination: Destination, conversion: FileConversion) -> None:

@@ -88,6 +88,9 @@ def command(
         options.refuse_given(context, ["overwrite"], "goes with --to roughness")
     if not textures:
         options.refuse_given(context, ["texels", "exponent_max"], "goes with --textures")
+    if texels and texels.strip().lower() != library.TEXTURE_EXPONENT:
+        reason = f"goes with --texels {library.TEXTURE_EXPONENT}"
+        options.refuse_given(context, ["exponent_max"], reason)
     chosen = options.chosen_metric(metric, exposure)
     # Mistakes in options are none of a library.
     library.texture_rule(texels or library.TEXTURE_EXPONENT, chosen, exponent_max)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -226,7 +228,9 @@ def _converted(
 @contextmanager
 def _pool(most: int) -> Iterator[ProcessPoolExecutor]:
     """Give processes, of which so many are useful; in the end they begin nothing more."""
-    pool = ProcessPoolExecutor(min(most, os.cpu_count() or 1), initializer=_end_by_signals)
+    pool = ProcessPoolExecutor(
+        min(most, os.cpu_count() or 1), initializer=_begin, initargs=(os.getpid(),)
+    )
     try:
         yield pool
     except BrokenProcessPool:
@@ -251,8 +255,12 @@ def _signals_wait() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _end_by_signals() -> None:
-    """Let a process of the pool end by signals, at once and unheard, as a terminal sends to all."""
+def _begin(parent: int) -> None:
+    """Let a process of the pool end by signals, at once and unheard, and with its parent.
+
+    A terminal sends signals to all; a parent that is killed sends nothing.
+    """
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     for number in _ENDING:
         signal.signal(number, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):
@@ -285,3 +293,9 @@ def _check_given(context: typer.Context, *names: str) -> None:
         if encodings.isdisjoint(known):
             needed = " or ".join(f"blinn-phong:{encoding}" for encoding in known)
             options.refuse_given(context, given, f"goes with {needed}")
+
+
+def _end_with(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(1)
+    os._exit(1)

@@ -376,7 +376,7 @@ _GGX_ROUGHNESS = "ggx:roughness"
 # A roughness is set with three digits at most.
 _ROUGHNESS_STEP = 0.001
 # Of exporters from 2.80 on: without a version, or with one such as "4.0.0 Alpha".
-_BLENDER_HEADER = r"# (?P<name>Blender)(?: v?(?P<version>\d[\d.]*)[^':]*?)? MTL File"
+_BLENDER_HEADER = r"#\s*(?P<name>Blender)(?:\s+v?(?P<version>\d[\d.]*)[^':]*?)?\s+MTL File"
 # From 2.80 on Blender writes 1, or the metallic that is not 0.
 _BLACK_AMBIENT = r"Ka 0\.0+ 0\.0+ 0\.0+\s"
 
@@ -410,7 +410,7 @@ DIALECTS = (
             larger_is_smoother=True,
         ),
         library=LibraryNumbers(
-            "Ns = 1.960784 (N − 1)", r"# (?P<name>Blender)(?:3D)? MTL File", 1.0
+            "Ns = 1.960784 (N − 1)", r"#\s*(?P<name>Blender)(?:3D)?\s+MTL File", 1.0
         ),
     ),
     Dialect(

@@ -163,6 +163,28 @@ def read_file(path: Path) -> bytes:
         raise MdfconvError(f"cannot read {path}: {error.strerror}") from None
 
 
+def _is_done(destination: Destination, original: bytes, conversion: FileConversion) -> bool:
+    """Return whether a file that is converted in place is already what it becomes."""
+    return destination.backup is not None and conversion.data == original
+
+
+def _backups(
+    changed: Sequence[tuple[Destination, bytes, FileConversion]],
+) -> tuple[dict[Path, bytes], dict[Path, Path]]:
+    """Return the originals of what changes in place, by their new names, and their files."""
+    contents: dict[Path, bytes] = {}
+    backups: dict[Path, Path] = {}
+    for destination, original, conversion in changed:
+        if destination.backup and not _is_done(destination, original, conversion):
+            if read_file(destination.source) != original:
+                raise MdfconvError(
+                    f"will not change {destination.source}: it has changed since it was read"
+                )
+            contents[destination.backup] = original
+            backups[destination.backup] = destination.source
+    return contents, backups
+
+
 def write_conversions(
     converted: Sequence[tuple[Destination, bytes, FileConversion]],
     *,
@@ -180,22 +202,15 @@ def write_conversions(
     MdfconvError
         If a file cannot be written, or two differ and have one name; nothing is then changed.
     """
-    changed = [each for each in converted if not (each[0].backup and each[2].data == each[1])]
-    contents: dict[Path, bytes] = {}
-    backups: dict[Path, Path] = {}
-    for destination, original, _ in changed:
-        if destination.backup:
-            if read_file(destination.source) != original:
-                raise MdfconvError(
-                    f"will not change {destination.source}: it has changed since it was read"
-                )
-            contents[destination.backup] = original
-            backups[destination.backup] = destination.source
+    changed = [each for each in converted if not _is_done(*each) or each[2].files]
+    contents, backups = _backups(changed)
     new = set(backups)
-    for destination, _, conversion in changed:
+    for destination, original, conversion in changed:
         if conversion.files and is_stream(destination.output):
             raise MdfconvError(f"no texture can stand beside {destination.output}: it is no file")
-        results = {destination.output: conversion.data, **conversion.files}
+        results = dict(conversion.files)
+        if not _is_done(destination, original, conversion):
+            results[destination.output] = conversion.data
         for path, data in results.items():
             if contents.setdefault(path, data) != data:
                 raise MdfconvError(f"two results would both be written to {path}")

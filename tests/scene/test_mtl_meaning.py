@@ -43,6 +43,8 @@ def library(header, numbers):
         ("# Blender 3.1.0 MTL File: 'None'", "225.000000", "blender-2.8", 0.5),
         ("# Blender 3.2.2 MTL File: 'None'", "250.000000", "blender-obj", 0.5),
         ("# Blender 5.0.0 Alpha MTL File: 'x'", "250.000000", "blender-obj", 0.5),
+        ("# Blender 4.2.3 LTS MTL File: x", "250", "blender-obj", 0.5),
+        ("#  Blender  4.2.3 MTL File: x", "250", "blender-obj", 0.5),
         ("# Blender v2.93.1 MTL File", "225.000000", "blender-2.8", 0.5),
         (PYTHON, "225.000000", "blender-2.8", 0.5),
         (PYTHON, "323.999994", "blender-2.8", 0.4),
@@ -227,6 +229,10 @@ def test_unknown_texels_are_left_until_they_are_named(tmp_path):
         (["--texels", "ggx:roughness"], "--texels goes with --textures"),
         (["--textures", "--texels", "ggx:rough"], "did you mean roughness"),
         (["--textures", "--texels", "blinn-phong"], "needs an encoding"),
+        (
+            ["--textures", "--texels", "ggx:roughness", "--exponent-max", "9"],
+            "--exponent-max goes with --texels blinn-phong:exponent",
+        ),
         (["--from", "ggx"], "Ns of a library is not stored as ggx"),
         (["--to", "shininess", "--overwrite-authored"], "goes with --to roughness"),
     ],
@@ -310,3 +316,59 @@ def test_the_table_says_what_ns_was_taken_for(tmp_path):
     assert status == 0
     assert "blinn-phong:blender-2.8," in text
     assert "written by Blender: Ns = 900 (1 − r)², as its numbers say" in " ".join(text.split())
+
+
+def textured(folder, text, *words):
+    """Convert a library with its textures; return status, result and messages."""
+    (folder / "a.mtl").write_text(text)
+    Image.new("L", (2, 2), 51).save(folder / "g.png")
+    status, _, err = run("mtl", "a.mtl", "-o", "b.mtl", "--textures", *words, cwd=folder)
+    return status, (folder / "b.mtl").read_text(), err
+
+
+def test_texels_that_are_rescaled_are_left(tmp_path):
+    text = "newmtl a\nNs 5\nmap_Ns -mm 0.5 0.25 g.png\nnewmtl b\nmap_Ns -mm 0 1 g.png\n"
+    status, result, err = textured(tmp_path, text)
+    assert status == 1
+    assert "a.mtl:3: map_Ns g.png has -mm 0.5 0.25, by which its texels are rescaled" in err
+    assert result == text.replace("Ns 5\n", "Ns 5\nPr 0.66892886\n") + "map_Pr -mm 0 1 g_Pr.png\n"
+    # A picture of roughness may be rescaled as before.
+    status, result, err = textured(tmp_path, text, "--texels", "ggx:roughness", "--force")
+    assert status == 0
+    assert "map_Pr -mm 0.5 0.25 g.png\n" in result
+
+
+def test_what_is_authored_stays_where_a_map_fails(tmp_path):
+    text = "newmtl a\nNs 3\nmap_Ns none.png\nmap_Pr keep.png\n"
+    status, result, err = textured(tmp_path, text, "--overwrite-authored")
+    assert (status, result) == (1, text)
+    assert "cannot read" in err
+
+
+def test_of_two_maps_the_last_counts(tmp_path):
+    text = "newmtl a\nmap_Ns g.png\nmap_Ns none.png\n"
+    status, result, _ = textured(tmp_path, text)
+    assert (status, result) == (1, text)
+
+
+def test_a_texture_alone_is_written_in_place_too(tmp_path):
+    (tmp_path / "a.mtl").write_text("newmtl a\nmap_Ns g.png\n")
+    Image.new("L", (2, 2), 51).save(tmp_path / "g.png")
+    assert run("mtl", "a.mtl", "--in-place", "--textures", cwd=tmp_path)[0] == 0
+    before = (tmp_path / "g_Pr.png").read_bytes()
+    again = ["--overwrite-authored", "--force", "--texels", "ggx:glossiness"]
+    status, _, err = run("mtl", "a.mtl", "--in-place", "--textures", *again, cwd=tmp_path)
+    assert status == 0
+    assert "wrote g_Pr.png" in err.replace(f"{tmp_path}/", "")
+    assert (tmp_path / "g_Pr.png").read_bytes() != before
+    assert np.asarray(Image.open(tmp_path / "g_Pr.png"))[0, 0] == 204
+    assert not (tmp_path / "a.mtl.bak2").exists()
+
+
+def test_a_second_conversion_in_place_is_noted(tmp_path):
+    (tmp_path / "a.mtl").write_text("newmtl a\nNs 5\n")
+    err = run("mtl", "a.mtl", "--in-place", "--replace", cwd=tmp_path)[2]
+    assert "before" not in err
+    (tmp_path / "a.mtl").write_text("newmtl a\nNs 5\n")
+    err = run("mtl", "a.mtl", "--in-place", "--replace", cwd=tmp_path)[2]
+    assert "a.mtl was converted in place before" in err

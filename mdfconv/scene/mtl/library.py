@@ -231,6 +231,9 @@ class _Edit:
                 problems.append(MaterialProblem(authored.number, text, ProblemKind.AUTHORED))
                 continue
             mapped = self.target == b"Pr" and self._names(source.block)
+            if self._fails(source.block) and not mapped:
+                # What its map would have replaced is better than the number alone.
+                continue
             if mapped and not authored:
                 # The map has the whole roughness, and readers multiply it by the number.
                 value, notes = b"1", (*material.notes, "Pr 1, as map_Pr has the roughness")
@@ -239,6 +242,11 @@ class _Edit:
             if value and not authored:
                 self._set_number(source, value, mapped=mapped)
         return converted, problems
+
+    def _fails(self, block: MaterialBlock) -> bool:
+        """Return whether a map that was to be overwritten has no texture to be overwritten by."""
+        asked = self.texture_names is not None and self.target == b"Pr"
+        return asked and bool(block.having(b"map_Ns")) and bool(block.having(b"map_Pr"))
 
     def _set_number(self, source: _SourceLines, value: bytes, *, mapped: bool) -> None:
         targets = source.block.having(self.target)
@@ -260,7 +268,7 @@ class _Edit:
                 kind = ProblemKind.TEXTURE if self.keyword == b"Ns" else ProblemKind.OTHER
                 text = f"{texture.keyword} {texture.file} is a texture"
                 problems.append(MaterialProblem(line.number, text, kind))
-            elif name := self.texture_names.get(texture.file):
+            elif name := self._new_name(line, texture):
                 options, _ = statements.split_options(line.value)
                 value = options + name.encode(errors="surrogateescape")
                 targets = block.having(b"map_" + self.target)[-1:]
@@ -270,7 +278,13 @@ class _Edit:
     def _names(self, block: MaterialBlock) -> bool:
         """Return whether a map of a material gets a new name."""
         textures = _textures([block], b"map_" + self.keyword)
-        return any(texture.file in (self.texture_names or {}) for *_, texture in textures)
+        return any(self._new_name(line, texture) for _, line, texture in textures)
+
+    def _new_name(self, line: Line, texture: TextureStatement) -> str:
+        """Return the name of a converted texture, "" if it has none."""
+        name = (self.texture_names or {}).get(texture.file, "")
+        # Texels that stay may be rescaled as before.
+        return "" if name != texture.file and statements.rescales(line) else name
 
 
 def _authored(block: MaterialBlock) -> Line | None:
@@ -418,11 +432,11 @@ def _textures(
     """Return the statements of a keyword that name a texture."""
     textures = []
     for block in blocks:
-        for line in block.having(keyword):
-            if line.value:
-                file = statements.split_options(line.value)[1].decode(errors="surrogateescape")
-                statement = TextureStatement(block.name, keyword.decode(), file, line.number)
-                textures.append((block, line, statement))
+        # As of numbers, the last counts.
+        for line in [line for line in block.having(keyword) if line.value][-1:]:
+            file = statements.split_options(line.value)[1].decode(errors="surrogateescape")
+            statement = TextureStatement(block.name, keyword.decode(), file, line.number)
+            textures.append((block, line, statement))
     return textures
 
 
@@ -476,6 +490,13 @@ def convert_library_textures(
                 problems.append(MaterialProblem(line.number, text, ProblemKind.TEXELS))
                 continue
             try:
+                if statements.rescales(line) and rule.endpoints()[0].label != ROUGHNESS:
+                    options = statements.split_options(line.value)[0].decode(errors="replace")
+                    raise MdfconvError(
+                        f"map_Ns {texture.file} has {options.strip()}, by which its texels are "
+                        "rescaled before they are read",
+                        "rescale the texture itself",
+                    )
                 names[texture.file] = _converted_texture(texture.file, folder, rule)
             except MdfconvError as error:
                 problems.append(MaterialProblem(line.number, str(error)))

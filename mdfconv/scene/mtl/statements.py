@@ -21,6 +21,8 @@ _TEXTURE = re.compile(rb"[ \t]*(?:map_\w+|bump|disp|decal|refl|norm)[ \t]+(.*)\Z
 _NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\Z")
 # What follows "1." of an infinity or of what is no number: "#INF00", "#QNAN0", "#IND".
 _NO_NUMBER = re.compile(rb"#(?:INF|IND|QNAN|SNAN)")
+# In any case of letters; the texels become base + gain · texel.
+_BASE_AND_GAIN = re.compile(rb"-mm[ \t]+(\S+)[ \t]+(\S+)", re.IGNORECASE)
 _OPTION = re.compile(
     rb"-[A-Za-z]\w*(?:[ \t]+(?:[+-]?[\d.]\S*|on|off|[rgbmlz](?=[ \t])|\w+_\w+))+[ \t]+"
 )
@@ -181,3 +183,14 @@ def split_options(value: bytes) -> tuple[bytes, bytes]:
     while match := _OPTION.match(value, end):
         end = match.end()
     return value[:end], value[end:]
+
+
+def rescales(line: Line) -> bool:
+    """Return whether a texture statement has a base and a gain, other than 0 and 1."""
+    match = _BASE_AND_GAIN.search(split_options(line.value)[0])
+    if not match:
+        return False
+    return not all(map(_NUMBER.match, match.groups())) or tuple(map(float, match.groups())) != (
+        0,
+        1,
+    )

@@ -164,7 +164,7 @@ def test_a_weight_that_is_assumed_is_noted_once():
     ((text, kind),) = found.remarks
     assert kind is ProblemKind.SPECULAR
     assert "L, the luminance of Ks, is not in the file: it was taken for 1" in text
-    assert "times 1 − L below L = 0.1" in text
+    assert "for L < 0.1 times (1 − L)" in text
     assert found.materials[0].result == pytest.approx(KNOWN[0.9], abs=1e-6)
     for data, more in (
         (text_of(weighted(0.9)), {}),
@@ -516,7 +516,9 @@ def test_a_dry_run_says_what_would_be_done(tmp_path):
     images = [{"uri": "wood.png"}]
     data = by("FBX2glTF", textured(0), factor(0.3), textures=[{"source": 0}], images=images)
     (tmp_path / "a.gltf").write_bytes(data)
-    status, _, err = run("gltf", "a.gltf", "--dry-run", "--mark", "--textures", cwd=tmp_path)
+    words = "gltf", "a.gltf", "--dry-run", "--mark", "--textures"
+    assert "nothing is written" in run(*words, cwd=tmp_path)[2]
+    status, _, err = run(*words, "--in-place", cwd=tmp_path)
     assert status == 0, err
     assert "0.489322" in err
     assert f"its texels taken for {PEAK_ALPHA}" in " ".join(err.split())

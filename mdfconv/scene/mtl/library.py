@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,6 +13,7 @@ from math import isclose
 import numpy as np
 
 from mdfconv.distributions.endpoint import texels_of
+from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.scene.material_files import FileConversion, TextureFolder
@@ -315,11 +316,16 @@ def _meaning(
     """Return what Ns is, as given or by what the library says."""
     if source.strip().lower() != AUTO:
         return asked_meaning(source)
+    return likely_meaning(statements.comments(lines), _numbers(blocks, b"Ns"), data)
+
+
+def _numbers(blocks: Sequence[MaterialBlock], keyword: bytes) -> Array:
+    """Return the numbers of all statements of a keyword that are numbers, shape (n,)."""
     numbers = []
-    for line in (line for block in blocks for line in block.having(b"Ns")):
+    for line in (line for block in blocks for line in block.having(keyword)):
         with suppress(MdfconvError):
             numbers.append(statements.number(line))
-    return likely_meaning(statements.comments(lines), np.array(numbers, float), data)
+    return np.array(numbers, float)
 
 
 def _sources(
@@ -327,11 +333,15 @@ def _sources(
 ) -> tuple[list[_SourceLines], list[MaterialProblem]]:
     """Return what is converted of the materials that have it, and which numbers cannot be."""
     sources, problems = [], []
+    illegal: set[float] = set()
+    if keyword == b"Ns":
+        known = np.unique(_numbers(blocks, keyword))
+        illegal |= set(known[~meaning.accepts(known)].tolist())
     for block in blocks:
         numbers: list[tuple[Line, float]] = []
         for line in block.having(keyword):
             try:
-                numbers.append((line, _legal_number(line, meaning)))
+                numbers.append((line, _legal_number(line, meaning, illegal)))
             except MdfconvError as error:
                 problems.append(MaterialProblem(line.number, str(error)))
         if numbers:
@@ -339,9 +349,9 @@ def _sources(
     return sources, problems
 
 
-def _legal_number(line: Line, meaning: NsMeaning) -> float:
+def _legal_number(line: Line, meaning: NsMeaning, illegal: Container[float]) -> float:
     number = statements.number(line)
-    if line.keyword == b"Ns" and not meaning.accepts(np.array([number]))[0]:
+    if number in illegal:
         what = f" of {meaning.end.label}" if meaning.dialect else ""
         hint = "Blender 2.7 wrote that for the roughest" if number == _ROUGHEST_HARDNESS else ""
         shown = line.value.decode(errors="replace")

@@ -1,8 +1,10 @@
 """``mdfconv texture`` as a process."""
 
+import os
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -278,3 +280,34 @@ def test_ending_it_leaves_nothing(unity):
     assert child.stderr.read() == b""
     assert not list(out.iterdir())
     child.stderr.close()
+
+
+CHILDREN = "/proc/{0}/task/{0}/children"
+
+
+@pytest.mark.skipif(not Path(CHILDREN.format(os.getpid())).exists(), reason="asks for children")
+def test_workers_end_with_what_was_killed(unity):
+    """What is killed tells its workers nothing."""
+    for number in range(4):
+        Image.fromarray(np.zeros((3000, 3000), np.uint8)).save(unity.with_name(f"g{number}.png"))
+    files = [str(unity.with_name(f"g{number}.png")) for number in range(4)]
+    out = f"{unity.parent / 'out'}/"
+    child = subprocess.Popen([*COMMAND, "texture", *files, "-o", out, *GLOSS])
+    children = Path(CHILDREN.format(child.pid))
+    deadline = time.monotonic() + 60
+    while not (workers := children.read_text().split()) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    child.kill()
+    child.wait(60)
+    assert workers
+    while any(map(_runs, workers)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(map(_runs, workers))
+
+
+def _runs(worker):
+    """Return whether a process is there and has not ended."""
+    try:
+        return " Z " not in Path(f"/proc/{worker}/stat").read_text()
+    except OSError:
+        return False

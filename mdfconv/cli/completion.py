@@ -96,10 +96,10 @@ def gltf_sources(incomplete: str) -> list[str]:
 def library_sources() -> list[str]:
     """Return what Ns of a material library can be."""
     from mdfconv.distributions.dialects import DIALECTS
-    from mdfconv.scene.mtl.meaning import AUTO
+    from mdfconv.scene.mtl.meaning import AUTO, is_of_libraries
     from mdfconv.scene.shininess import SHININESS
 
-    stored = [each for each in DIALECTS if each.roughness or each.library]
+    stored = filter(is_of_libraries, DIALECTS)
     return [AUTO, SHININESS, *(f"{SHININESS}:{each.name}" for each in stored)]
 
 

@@ -90,7 +90,7 @@ def command(
     target = target or ROUGHNESS
     guessed = source.strip().lower() == AUTO
     source = AUTO if guessed else source
-    # A mistake in the names is none of a file.
+    # Wrong names are refused before any file is read.
     pair = MaterialEnds(target if guessed else source, target, None if guessed else specular).pair
     if texels:
         TextureRule(texels, pair[1]).endpoints()

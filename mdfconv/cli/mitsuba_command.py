@@ -67,7 +67,7 @@ def command(
     from mdfconv.scene.texture.rule import TextureRule
 
     target = mitsuba.check_target(to)
-    # A mistake in the name is none of a file.
+    # A wrong name is refused before any file is read.
     taken_for = options.asked_endpoint(source).label if source else None
     chosen = options.chosen_metric(metric, exposure)
 

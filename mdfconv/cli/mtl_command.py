@@ -78,7 +78,7 @@ def command(
     """
     from mdfconv.scene.material_files import Destination, TextureFolder
     from mdfconv.scene.mtl import library
-    from mdfconv.scene.mtl.meaning import AUTO, asked_meaning
+    from mdfconv.scene.mtl.meaning import AUTO, TEXTURE_EXPONENT, asked_meaning
     from mdfconv.scene.stored import MaterialProblem, ProblemKind
 
     to = to.strip().lower()
@@ -88,12 +88,12 @@ def command(
         options.refuse_given(context, ["overwrite"], "goes with --to roughness")
     if not textures:
         options.refuse_given(context, ["texels", "exponent_max"], "goes with --textures")
-    if texels and texels.strip().lower() != library.TEXTURE_EXPONENT:
-        reason = f"goes with --texels {library.TEXTURE_EXPONENT}"
+    if texels and texels.strip().lower() != TEXTURE_EXPONENT:
+        reason = f"goes with --texels {TEXTURE_EXPONENT}"
         options.refuse_given(context, ["exponent_max"], reason)
     chosen = options.chosen_metric(metric, exposure)
-    # Mistakes in options are none of a library.
-    library.texture_rule(texels or library.TEXTURE_EXPONENT, chosen, exponent_max)
+    # Wrong options are refused before any library is read.
+    library.texture_rule(texels or TEXTURE_EXPONENT, chosen, exponent_max)
     if source.strip().lower() != AUTO:
         asked_meaning(source)
 

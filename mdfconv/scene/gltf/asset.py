@@ -99,7 +99,7 @@ def convert_gltf(
         If the file is no glTF 2.0, a name or the metric is not known, or the generator stands for
         no source.
     """
-    # What is wrong with the names is none of a file.
+    # Wrong names are refused before the file is read.
     MaterialEnds(target if source == AUTO else source, target)
     document, metric = GltfDocument(data), metric_named(metric)
     if document.mark is not None:

@@ -12,7 +12,7 @@ from mdfconv.errors import MdfconvError
 from mdfconv.scene.gltf.buffers import GltfBuffers, index_of
 from mdfconv.scene.gltf.document import METALLIC_ROUGHNESS, GltfDocument, RoughnessField, walk
 from mdfconv.scene.gltf.images import GltfImages, GltfTextures, green_of_alpha
-from mdfconv.scene.gltf.json_edit import JsonText
+from mdfconv.scene.gltf.json_edit import JsonText, Place
 from mdfconv.scene.stored import ProblemKind
 from mdfconv.scene.texture.convert import convert_texture_bytes
 from mdfconv.scene.texture.rule import TextureRule, ValueConverter
@@ -78,23 +78,13 @@ class TextureConversion:
         versions: defaultdict[tuple[int, TextureRule], dict[int, int]] = defaultdict(dict)
         for at, rule in rules.items():
             try:
-                name = _index(self._document.texture_of(at, self._read))
-                texture = index_of(name, self._textures, "texture")
-                image = self._image(texture)
+                texture = texture_named(self._document.texture_of(at, self._read), self._textures)
+                image = image_shown(texture, self._textures, self._images.images)
             except MdfconvError as error:
                 self.problems[at] = str(error), ProblemKind.OTHER
             else:
                 versions[image, rule][at] = texture
         return versions
-
-    def _image(self, at: int) -> int:
-        """Return which image a texture shows."""
-        texture = self._textures[at].value
-        if any(name == "source" for name, _ in walk(texture.get("extensions"))):
-            raise MdfconvError(
-                f"textures[{at}] has an image in an extension, which is not converted"
-            )
-        return index_of(texture.get("source"), self._images.images, "image")
 
     def _content(self, image: int, rule: TextureRule, materials: Collection[int]) -> bytes:
         """Return the converted content of an image, empty if it cannot be converted."""
@@ -159,12 +149,22 @@ class TextureConversion:
             if isinstance(texture, dict) and id(texture) not in free:
                 # What names nothing uses nothing.
                 with suppress(MdfconvError):
-                    at = index_of(_index(texture), self._textures, "texture")
+                    at = texture_named(texture, self._textures)
                     source = self._textures[at].value.get("source")
                     images.add(index_of(source, self._images.images, "image"))
         return images
 
 
-def _index(texture: Any) -> Any:
+def texture_named(named: Any, textures: list[Place]) -> int:
     """Return which texture an object of a material names."""
-    return texture.get("index") if isinstance(texture, dict) else None
+    return index_of(named.get("index") if isinstance(named, dict) else None, textures, "texture")
+
+
+def image_shown(texture: int, textures: list[Place], images: list[Place]) -> int:
+    """Return which image a texture shows."""
+    value = textures[texture].value
+    if any(name == "source" for name, _ in walk(value.get("extensions"))):
+        raise MdfconvError(
+            f"textures[{texture}] has an image in an extension, which is not converted"
+        )
+    return index_of(value.get("source"), images, "image")

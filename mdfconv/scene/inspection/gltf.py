@@ -12,19 +12,18 @@ from typing import Any
 from mdfconv.distributions.endpoint import endpoint, texels_of
 from mdfconv.errors import MdfconvError
 from mdfconv.scene.gltf.asset import GltfConversion, convert_gltf, dialects_by_generator
-from mdfconv.scene.gltf.buffers import GltfBuffers, index_of, is_data
+from mdfconv.scene.gltf.buffers import GltfBuffers, is_data
 from mdfconv.scene.gltf.document import (
     METALLIC_ROUGHNESS,
     SPECULAR_GLOSSINESS,
     GltfDocument,
     RoughnessField,
     is_glb,
-    walk,
 )
 from mdfconv.scene.gltf.elsewhere import roughness_tracks, stray_roughnesses
 from mdfconv.scene.gltf.ends import GLOSSINESS
 from mdfconv.scene.gltf.images import GltfImages, GltfTextures
-from mdfconv.scene.gltf.json_edit import Place
+from mdfconv.scene.gltf.textures import image_shown, texture_named
 from mdfconv.scene.inspection.pictures import picture_of_bytes
 from mdfconv.scene.inspection.records import (
     Arguments,
@@ -179,7 +178,7 @@ def _textures_of(
             named = document.texture_of(at, field)
             if not named:
                 continue
-            image = _image_of(named, entries, pictures.images)
+            image = image_shown(texture_named(named, entries), entries, pictures.images)
             if image in textures:
                 continue
             picture = picture_of_bytes(*pictures.read(image), field.channel)
@@ -196,12 +195,3 @@ def _textures_of(
                 taken_for=texels,
             )
     return list(textures.values()), problems
-
-
-def _image_of(named: Any, textures: list[Place], images: list[Place]) -> int:
-    """Return which image a texture shows, by what a material says of it."""
-    index = named.get("index") if isinstance(named, dict) else None
-    texture = textures[index_of(index, textures, "texture")].value
-    if any(name == "source" for name, _ in walk(texture.get("extensions"))):
-        raise MdfconvError("its texture has an image in an extension, which is not converted")
-    return index_of(texture.get("source"), images, "image")

@@ -25,8 +25,9 @@ from mdfconv.scene.inspection.records import (
 )
 from mdfconv.scene.material_files import read_file
 from mdfconv.scene.mitsuba.convert import MitsubaMaterial, convert_mitsuba
-from mdfconv.scene.mitsuba.scene import DISTRIBUTIONS, MitsubaScene
-from mdfconv.scene.mtl.library import MtlConversion, MtlMaterial, To, convert_mtl, library_texels
+from mdfconv.scene.mitsuba.scene import MitsubaScene, source_of
+from mdfconv.scene.mtl.library import MtlConversion, MtlMaterial, To, convert_mtl
+from mdfconv.scene.mtl.meaning import asked_meaning
 from mdfconv.scene.shininess import ROUGHNESS
 from mdfconv.scene.stored import MaterialProblem, ProblemKind
 
@@ -49,7 +50,7 @@ def inspect_scene(path: Path) -> FileInspection:
     target = TARGET.name
     found = convert_mitsuba(data, target, texture=texture)
     textures = [
-        replace(pictures[each.file, _source(each.distribution)], place=each.line)
+        replace(pictures[each.file, source_of(each.distribution)], place=each.line)
         for each in found.textures
     ]
     left = [each for each in found.materials if each.distribution != target]
@@ -70,13 +71,8 @@ def inspect_scene(path: Path) -> FileInspection:
     )
 
 
-def _source(distribution: str) -> str:
-    """Return what is stored under a distribution in Mitsuba's words."""
-    return DISTRIBUTIONS.get(distribution, distribution)
-
-
 def _bsdf(material: MitsubaMaterial) -> InspectedNumber:
-    source = endpoint(_source(material.distribution))
+    source = endpoint(source_of(material.distribution))
     return InspectedNumber(
         material.name,
         material.line,
@@ -105,7 +101,7 @@ def inspect_library(path: Path) -> FileInspection:
     """Return what a Wavefront material library is."""
     data = read_file(path)
     found = convert_mtl(data)
-    textures, problems = _textures_of(path, found, library_texels(data))
+    textures, problems = _textures_of(path, found, asked_meaning(found.source).texels)
     problems += [each for each in found.problems if each.kind is ProblemKind.OTHER]
     # What has a roughness by its author needs none.
     authored = [(each.place, each.text) for each in found.problems if _is_authored(each)]

@@ -17,7 +17,7 @@ from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.solve import errors_of_many
 from mdfconv.scene.material_files import FileConversion
-from mdfconv.scene.mitsuba.scene import DISTRIBUTIONS, TARGETS, Bsdf, MitsubaScene
+from mdfconv.scene.mitsuba.scene import TARGETS, Bsdf, MitsubaScene, source_of
 from mdfconv.scene.mitsuba.xml_edit import Element, XmlEdits, attribute_text
 from mdfconv.scene.stored import ConvertedNumber, MaterialProblem, Outcome, StoredConverter
 
@@ -246,7 +246,7 @@ class _Numbers:
     """
 
     def __init__(self, source: str, numbers: Iterable[float], target: str, metric: Metric) -> None:
-        self._source = endpoint(DISTRIBUTIONS.get(source, source))
+        self._source = endpoint(source_of(source))
         stored = np.array(sorted(numbers), dtype=np.float64)
         parameter = self._source.decode_legal(stored)
         legal = ~np.isnan(parameter)

@@ -66,6 +66,14 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\Z")
 _PARAMETER = re.compile(r"\$(\w+)")
 
 
+def source_of(distribution: str) -> str:
+    """Return what the α of a distribution in Mitsuba's words is, as `mdfconv.convert` names it.
+
+    What is not one of `DISTRIBUTIONS` is such a name already.
+    """
+    return DISTRIBUTIONS.get(distribution, distribution)
+
+
 @dataclass(eq=False)
 class Roughness:
     """Where the α of a BSDF, of one axis or of both, comes from.
@@ -131,7 +139,7 @@ class Bsdf:
     @property
     def source(self) -> str:
         """What its α or its exponent is, as `mdfconv.convert` names it."""
-        return self.taken_for or DISTRIBUTIONS[self.distribution]
+        return self.taken_for or source_of(self.distribution)
 
     @property
     def meaning(self) -> str:

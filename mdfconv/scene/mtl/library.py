@@ -12,7 +12,6 @@ from math import isclose
 
 import numpy as np
 
-from mdfconv.distributions.endpoint import texels_of
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
@@ -20,7 +19,7 @@ from mdfconv.scene.material_files import FileConversion, TextureFolder
 from mdfconv.scene.mtl import statements
 from mdfconv.scene.mtl.meaning import AUTO, NsMeaning, asked_meaning, likely_meaning
 from mdfconv.scene.mtl.statements import Line, MaterialBlock
-from mdfconv.scene.shininess import ROUGHNESS, SHININESS, luminance
+from mdfconv.scene.shininess import ROUGHNESS, luminance
 from mdfconv.scene.stored import UNIFORM_BELOW, MaterialProblem, ProblemKind
 from mdfconv.scene.texture.convert import Progress
 from mdfconv.scene.texture.rule import TextureRule
@@ -33,8 +32,6 @@ _DIGITS = {b"Pr": 8, b"Ns": 6}
 # A Pr that is so near to what would be written is that.
 _SAME = 1e-6
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
-# What a texture of exponents holds, as a share of the largest.
-TEXTURE_EXPONENT = f"{SHININESS}:exponent"
 _ROUGHEST_HARDNESS = -1.960784
 
 
@@ -455,8 +452,7 @@ def library_texels(data: bytes, source: str = AUTO) -> str:
 
     It is the name of an endpoint; the source as for `convert_mtl`.
     """
-    meaning = _meaning(data, *_read(data), source)
-    return texels_of(meaning.end) if meaning.dialect else TEXTURE_EXPONENT
+    return _meaning(data, *_read(data), source).texels
 
 
 def texture_rule(texels: str, metric: Metric, exponent_max: float) -> TextureRule:

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from mdfconv.distributions.dialects import DIALECTS, Dialect, LibraryNumbers
-from mdfconv.distributions.endpoint import Endpoint, dialect_of, endpoint
+from mdfconv.distributions.endpoint import Endpoint, dialect_of, endpoint, texels_of
 from mdfconv.distributions.evaluation import Array, Mask
-from mdfconv.distributions.parameter import number_text
+from mdfconv.distributions.parameter import Encoding, number_text
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric
 from mdfconv.scene.shininess import SHININESS, exponent_of, fit_error, roughness_of
 from mdfconv.scene.stored import UNIFORM_BELOW
 
 AUTO = "auto"
+# What a texture of exponents holds, as a share of the largest.
+TEXTURE_EXPONENT = f"{SHININESS}:exponent"
 # Numbers have six decimals in libraries, and were single-precision before.
 _LAST_DECIMAL, _SINGLE = 1e-6, 1e-7
 _LARGEST = 1000.0
@@ -52,19 +54,28 @@ class NsMeaning:
         return dialect_of(self.end)
 
     @property
-    def is_roughness(self) -> bool:
-        """Whether Ns was made from the roughness of GGX, which then is known exactly."""
-        return self.dialect is not None and self.dialect.roughness is not None
+    def texels(self) -> str:
+        """The endpoint that names what texels of ``map_Ns`` are; "" if it is not known."""
+        return texels_of(self.end) if self.dialect else TEXTURE_EXPONENT
+
+    @cached_property
+    def _rule(self) -> tuple[Encoding, Callable[[Array], Array]] | None:
+        """The encoding of what a program makes Ns from, and the roughness of that; None of others.
+
+        The roughness of GGX is then known exactly.
+        """
+        encoding, dialect = self.end.encoding, self.dialect
+        return (encoding, dialect.roughness) if encoding and dialect and dialect.roughness else None
 
     def accepts(self, numbers: Array) -> Mask:
         """Return which Ns the program writes, shape (n,)."""
-        if not self.is_roughness:
+        if not self._rule:
             zero = not self.dialect and numbers == 0
             legal: Mask = self.end.stored.accepts(numbers) | zero
             return legal
-        assert self.end.encoding is not None
+        encoding, _ = self._rule
         with np.errstate(all="ignore"):
-            back = self.end.encoding.decode(self.end.encoding.encode(numbers))
+            back = encoding.decode(encoding.encode(numbers))
         return np.isclose(back, numbers, rtol=1e-9, atol=1e-9)
 
     @property
@@ -72,20 +83,17 @@ class NsMeaning:
         """The range of Ns in words."""
         if self.dialect is None:
             return "Ns ≥ 0"
-        if not self.is_roughness:
+        if not self._rule:
             return self.end.stored.legal
-        clamps = self.end.encoding.clamps if self.end.encoding else ()
-        above = [f" ≤ {number_text(clamp.limit)}" for clamp in clamps if clamp.above]
+        encoding, _ = self._rule
+        above = [f" ≤ {number_text(clamp.limit)}" for clamp in encoding.clamps if clamp.above]
         return f"0 ≤ Ns{above[0]}" if above else "Ns ≥ 0"
 
     def converted(self, numbers: Array, metric: Metric) -> tuple[Array, Array, Array]:
         """Return the exponents, NaN of a known roughness, the Pr and their errors, shape (n,)."""
-        if self.is_roughness:
-            encoding, dialect = self.end.encoding, self.dialect
-            assert encoding is not None
-            assert dialect is not None
-            assert dialect.roughness is not None
-            roughness = np.clip(dialect.roughness(encoding.encode(numbers)), 0, 1)
+        if self._rule:
+            encoding, roughness_of_stored = self._rule
+            roughness = np.clip(roughness_of_stored(encoding.encode(numbers)), 0, 1)
             return np.full_like(numbers, np.nan), roughness, np.zeros_like(numbers)
         exponent = self.end.encoding.decode(numbers) if self.end.encoding else numbers
         # A rounded number may be a little beside the exponent 0.
@@ -97,20 +105,22 @@ class NsMeaning:
 
         NaN is what has none: a mirror of an exponent.
         """
-        if self.is_roughness:
-            encoding, dialect = self.end.encoding, self.dialect
-            assert encoding is not None
-            assert dialect is not None
-            assert dialect.roughness is not None
+        if self._rule:
+            encoding, roughness_of_stored = self._rule
             # A roughness is stored as itself or as 1 − it: the way back is the same.
             with np.errstate(divide="ignore"):
-                shininess = encoding.decode(dialect.roughness(roughness))
+                shininess = encoding.decode(roughness_of_stored(roughness))
             shininess = np.where(np.isfinite(shininess), shininess, np.nan)
             return shininess, np.full_like(roughness, np.nan), np.zeros_like(roughness)
         exponent = exponent_of(roughness, metric)
         shininess = self.end.encoding.encode(exponent) if self.end.encoding else exponent
         shininess = np.where(self.accepts(shininess) | (exponent == 0), shininess, np.nan)
         return shininess, exponent, fit_error(exponent, metric)
+
+
+def is_of_libraries(dialect: Dialect) -> bool:
+    """Return whether Ns can be what a dialect of Blinn's exponent says."""
+    return dialect.roughness is not None or dialect.library is not None
 
 
 def asked_meaning(name: str) -> NsMeaning:
@@ -124,7 +134,7 @@ def asked_meaning(name: str) -> NsMeaning:
     end = endpoint(name)
     dialect = dialect_of(end)
     exponent = end.distribution.name == SHININESS
-    if not exponent or (end.encoding and not (dialect and (dialect.roughness or dialect.library))):
+    if not exponent or (end.encoding and not (dialect and is_of_libraries(dialect))):
         known = ", ".join(
             f"{SHININESS}:{each.name}" for each in DIALECTS if each.library is not None
         )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdfconv.distributions import Distribution
-from mdfconv.distributions import distribution as distribution_named
+from mdfconv.distributions.endpoint import follow, to_root
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.registry import Registry
@@ -140,18 +140,6 @@ class Microsurface:
         phi = azimuth(m) if isinstance(self.parameter, tuple) else None
         return np.where(m[..., 2] > 0, self.at_angle(theta, phi), 0)
 
-    @cached_property
-    def _smith(self) -> tuple[Distribution, tuple[float, float]] | None:
-        """The distribution of the same lobe whose Λ is known, and its roughness along x and y."""
-        form, pair = self.distribution, _pair(self.parameter)
-        while not form.smith:
-            equal = form.equivalent
-            if equal is None or not equal.same_lobe:
-                return None
-            x, y = equal.forward(np.array(pair)).tolist()
-            form, pair = distribution_named(equal.name), (x, y)
-        return form, pair
-
     def smith_lambda(self, omega: Array) -> Array:
         """Return Smith's Λ for directions.
 
@@ -168,15 +156,20 @@ class Microsurface:
         Raises
         ------
         MdfconvError
-            If no closed form is known for the distribution.
+            If there is a pair of parameters and D does not scale with the slope.
         """
-        if self._smith is None:
-            raise MdfconvError(f"{self.distribution.label} has no closed form of Smith's masking")
-        form, (alpha_x, alpha_y) = self._smith
+        if isinstance(self.parameter, tuple) and not self.distribution.scales_with_slope:
+            raise MdfconvError(
+                f"{self.distribution.label} has no Smith's masking for a pair of parameters",
+                "give one parameter, or choose another masking",
+            )
+        # α tan θ along the azimuth of the direction is that of the rougher axis, shortened.
+        pair = _pair(self.parameter)
+        rougher = max(pair)
         x, y, z = np.moveaxis(omega, -1, 0)
         with np.errstate(divide="ignore", over="ignore"):
-            # α tan θ, along the azimuth of the direction.
-            return form.smith_lambda(np.hypot(alpha_x * x, alpha_y * y) / np.abs(z))
+            tangent = np.hypot(pair[0] / rougher * x, pair[1] / rougher * y) / np.abs(z)
+            return self.distribution.smith_lambda(tangent, rougher)
 
     def smith_g1(self, omega: Array, m: Array) -> Array:
         """Return Smith's G₁ = 1/(1+Λ) for directions, 0 where they see the facet from behind."""
@@ -213,10 +206,16 @@ class Microsurface:
         """Return the density of `half_vectors`, 1/sr: D cos θ."""
         return replace(self, normalized=True).density(m) * np.maximum(m[..., 2], 0)
 
+    @cached_property
+    def _ellipsoid(self) -> Array | None:
+        """The α of GGX along x and y, if it is that by whatever name."""
+        root, steps, _ = to_root(self.distribution, same_lobe=True)
+        return follow(steps, np.array(_pair(self.parameter))) if root.name == _ELLIPSOID else None
+
     @property
     def has_visible_normals(self) -> bool:
         """Whether `visible_normals` can be drawn: of GGX, by whatever name."""
-        return self._smith is not None and self._smith[0].name == _ELLIPSOID
+        return self._ellipsoid is not None
 
     def visible_normals(self, view: Array, u1: Array, u2: Array) -> Array:
         """Draw the microfacet normals that a viewer sees (Heitz 2018).
@@ -233,12 +232,12 @@ class Microsurface:
         MdfconvError
             If the distribution is not GGX.
         """
-        if self._smith is None or not self.has_visible_normals:
+        if self._ellipsoid is None:
             raise MdfconvError(
                 f"{self.distribution.label} has no sampler of visible normals",
                 f"{_ELLIPSOID} has one",
             )
-        scale = np.array([*self._smith[1], 1.0])
+        scale = np.append(self._ellipsoid, 1.0)
         stretched = unit(view * scale)
         # One axis is level, the other rises towards the normal: where the disk is squeezed.
         x, y, _ = np.moveaxis(stretched, -1, 0)

@@ -6,6 +6,7 @@ import copy
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, ClassVar, Self, TypedDict, Unpack, overload
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from mdfconv.distributions.evaluation import Array, Kernel, as_operand, computing_dtype, evaluate
 from mdfconv.distributions.parameter import Encoding, Parameter, number_text
+from mdfconv.distributions.smith import SmithTable, smith_table
 from mdfconv.errors import MdfconvError
 
 
@@ -165,7 +167,8 @@ class Distribution(ABC):
     scales_with_slope : bool
         Whether the cumulative distribution is a function of tan β over the parameter.
     smith : bool
-        Whether Smith's Λ is known.
+        Whether Smith's Λ has a closed form, which `smith_lambda` then computes for arrays of
+        parameters, too.
     equivalent : Equivalent or None
         The distribution that it is in another parameter.
     map_variables : MapVariables or None
@@ -491,12 +494,31 @@ class Distribution(ABC):
         """Kernel of ∂ ln(max D / D(0)) / ∂ ln p."""
         return np.zeros_like(parameter)
 
-    def smith_lambda(self, slope: Array) -> Array:
-        """Return Smith's Λ for α tan θ ≥ 0, the slope of a direction in units of the roughness.
+    def smith_lambda(self, tangent: Array, parameter: float | Array) -> Array:
+        """Return Smith's Λ, by which G₁ = 1/(1 + Λ) (Heitz 2014).
 
-        Raise `MdfconvError` if no closed form is known.
+        By a closed form where one is known. Else a table is made for the parameter, with an error
+        of about 1e-10 of 1 + Λ; the last ones are kept.
+
+        Parameters
+        ----------
+        tangent : numpy.ndarray
+            tan θ of the directions, θ their angles from the surface normal; from 0, which is the
+            normal, to infinity.
+        parameter : float
+            The parameter, unchecked; γ is that of the distribution, one number. Where `smith` is
+            true the parameter may be an array that broadcasts.
+
+        Returns
+        -------
+        numpy.ndarray
+            Λ ≥ 0 in the shape of `tangent`, float64; infinite where that is.
         """
-        raise MdfconvError(f"{self.name} has no closed form of Smith's masking")
+        if not self.scales_with_slope:
+            return _smith_table(self, float(parameter))(tangent)
+        # A function of the product: one table for all parameters.
+        typical = self.parameter.typical_value
+        return _smith_table(self, typical)(tangent * (parameter / typical))
 
     def mode(self, parameter: Array) -> Array:
         """Return the angle at which D is largest, radians; 0 unless a subclass says otherwise."""
@@ -691,6 +713,15 @@ class AlphaDistribution(Distribution):
 
     def _from_peak_alpha(self, alpha: Array) -> Array:
         return alpha
+
+
+@lru_cache(maxsize=64)
+def _smith_table(mdf: Distribution, parameter: float) -> SmithTable:
+    """Return the table of Λ for a lobe."""
+    one = np.array([parameter])
+    edge = mdf.edge(one)
+    end = None if edge is None else float(edge[0])
+    return smith_table(lambda beta: mdf._lobe(beta, one), float(mdf._peak_alpha(one)[0]), end)
 
 
 def _elementwise(function: Kernel, values: ArrayLike) -> Any:

@@ -92,10 +92,11 @@ class Beckmann(base.AlphaDistribution, base.AnisotropicDistribution):
         # Walter et al. 2007, eq. (28).
         return np.arctan(parameter * np.sqrt(base.negative_log_tail(lobe, tail)))
 
-    def smith_lambda(self, slope: Array) -> Array:
-        """Return Λ = ½ (erf(a) − 1) + e^(−a²)/(2a√π), a = 1/slope (Heitz 2014, eq. 66)."""
+    def smith_lambda(self, tangent: Array, parameter: float | Array) -> Array:
+        """Return Λ = ½ (erf(a) − 1) + e^(−a²)/(2a√π), a = 1/(m tan θ) (Heitz 2014, eq. 66)."""
         from scipy.special import erfcx
 
+        slope = parameter * tangent
         with np.errstate(all="ignore"):
             a = 1 / slope
             # erf − 1 = −erfc, and both terms have the factor e^(−a²).

@@ -85,12 +85,9 @@ class GGX(base.AlphaDistribution, base.AnisotropicDistribution):
         # Walter et al. 2007, eq. (35).
         return np.arctan(parameter * np.sqrt(lobe / tail))
 
-    def smith_lambda(self, slope: Array) -> Array:
-        """Return Λ = ½ (√(1 + slope²) − 1) (Walter et al. 2007, eq. 34; Heitz 2014, eq. 72)."""
-        with np.errstate(invalid="ignore"):
-            # Without the difference, and without slope² where it would overflow.
-            value = 0.5 * slope * (slope / (1 + np.hypot(1, slope)))
-        return np.where(np.isinf(slope), np.inf, value)
+    def smith_lambda(self, tangent: Array, parameter: float | Array) -> Array:
+        """Return Λ = ½ (√(1 + α² tan²θ) − 1)."""
+        return trowbridge_reitz_lambda(parameter * tangent)
 
     def _half_tangent(self, parameter: Array) -> Array:
         # t² = e α² / (1 − (1+e) α²), e = √2 − 1: Sawicki 2021, eq. (8), free of its 1 − cos².
@@ -99,6 +96,14 @@ class GGX(base.AlphaDistribution, base.AnisotropicDistribution):
     def _from_half_tangent(self, tangent: Array) -> Array:
         # Sawicki 2021, eq. (5), likewise.
         return tangent / np.sqrt(_EXCESS + np.sqrt(2) * np.square(tangent))
+
+
+def trowbridge_reitz_lambda(slope: Array) -> Array:
+    """Return ½ (√(1 + slope²) − 1) (Walter et al. 2007, eq. 34; Heitz 2014, eq. 72)."""
+    with np.errstate(invalid="ignore"):
+        # Without the difference, and without slope² where it would overflow.
+        value = 0.5 * slope * (slope / (1 + np.hypot(1, slope)))
+    return np.where(np.isinf(slope), np.inf, value)
 
 
 def trowbridge_reitz(beta: Array, scale: Array, out: Array | None) -> Array:

@@ -132,6 +132,12 @@ class GTR(Distribution):
         sine_square = np.where(low, sine_square, 1 - cosine_square)
         return np.arctan2(np.sqrt(sine_square), np.sqrt(cosine_square))
 
+    def smith_lambda(self, tangent: Array, parameter: float | Array) -> Array:
+        """Return Λ, that of GGX at γ = 2."""
+        if self.equivalent:
+            return ggx.trowbridge_reitz_lambda(parameter * tangent)
+        return super().smith_lambda(tangent, parameter)
+
     def _half_tangent(self, parameter: Array) -> Array:
         # t² = e α² / (1 − (1+e) α²), e = 2^(1/γ) − 1
         excess = np.expm1(np.log(2) / self.gamma)

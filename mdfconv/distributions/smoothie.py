@@ -89,6 +89,10 @@ class Smoothie(Distribution):
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         return np.arctan(to_ggx(parameter) * np.sqrt(lobe / tail))
 
+    def smith_lambda(self, tangent: Array, parameter: float | Array) -> Array:
+        """Return Λ, that of GGX with α_s/√(4+α_s²)."""
+        return ggx.trowbridge_reitz_lambda(to_ggx(np.asarray(parameter)) * tangent)
+
     def _half_tangent(self, parameter: Array) -> Array:
         square = 0.25 * _EXCESS * np.square(parameter)
         return np.sqrt(square / (1 - square))

@@ -8,7 +8,7 @@ import numpy as np
 
 from mdfconv.distributions import base
 from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
-from mdfconv.distributions.ggx import ggx_at_two
+from mdfconv.distributions.ggx import ggx_at_two, trowbridge_reitz_lambda
 from mdfconv.distributions.parameter import Parameter
 
 # tan²β of an angle that no double tells from π/2.
@@ -93,6 +93,12 @@ class StudentT(base.AlphaDistribution):
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         x = np.expm1(base.negative_log_tail(lobe, tail) / (self.gamma - 1))
         return np.arctan(parameter * np.sqrt((self.gamma - 1) * x))
+
+    def smith_lambda(self, tangent: Array, parameter: float | Array) -> Array:
+        """Return Λ, that of GGX at γ = 2."""
+        if self.equivalent:
+            return trowbridge_reitz_lambda(parameter * tangent)
+        return super().smith_lambda(tangent, parameter)
 
     def mode(self, parameter: Array) -> Array:
         """Return the angle of the maximum, 0 while α² ≤ γ/(2(γ−1))."""

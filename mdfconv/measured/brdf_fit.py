@@ -464,7 +464,7 @@ class _DirectionalLobe(_Lobe):
         if form is None:
             return 1.0 if self.masking == "none" else self._v_cavity
         smith, alpha = form
-        incident, outgoing = (smith.smith_lambda(alpha * tangent) for tangent in self._tangents)
+        incident, outgoing = (smith.smith_lambda(tangent, alpha) for tangent in self._tangents)
         return 1 / (1 + incident + outgoing)
 
     def slopes(self, point: Array) -> list[Array]:

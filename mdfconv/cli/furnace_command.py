@@ -16,11 +16,11 @@ _MOST_SAMPLES = 10_000_000
 # Samples at all points together: some seconds.
 _MOST_DIRECTIONS = 100_000_000
 
-_PARAMETER = argument("PARAMETER", "Exponent of the Phong BRDFs, α of the others.")
+_PARAMETER = argument("PARAMETER", "Exponent of the Phong BRDFs, the distribution's of the others.")
 _BRDF = option(
     "BRDF",
-    "phong, modified-phong, ggx, beckmann, smoothie, smoothie-approx or "
-    "ashikhmin-shirley; ggx:roughness takes PARAMETER for a stored form of α.",
+    "ggx, beckmann, gauss, schlick, sawicki, blinn-phong, phong, modified-phong, smoothie, "
+    "smoothie-approx or ashikhmin-shirley; ggx:roughness takes PARAMETER for a stored form of α.",
     words=completion.furnace_brdfs,
 )
 _NORMALIZER = option(
@@ -30,7 +30,7 @@ _NORMALIZER = option(
 )
 _MASKING = option(
     "G",
-    "Of ggx and beckmann: correlated (the default), separable, v-cavity, ksk or none.",
+    "Of ggx to blinn-phong: correlated (the default), separable, v-cavity, ksk or none.",
     "--g",
     words=completion.maskings,
 )

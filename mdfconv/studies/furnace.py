@@ -89,13 +89,15 @@ class FurnaceModel:
 
     `width` is about the angle, in radians, over which it falls from its peak, which surrounds the
     mirror image of the viewer (Phong) or, in half vectors, the normal (microfacets). `sample`
-    takes (view, u₁, u₂) to light directions and their density, 1/sr.
+    takes (view, u₁, u₂) to light directions and their density, 1/sr. Beyond `edge`, tan β of the
+    half vector, the BRDF is 0.
     """
 
     brdf: Brdf
     width: float
     around_mirror: bool
     sample: Callable[[Array, Array, Array], tuple[Array, Array]]
+    edge: float = np.inf
 
 
 def directional_albedo(model: FurnaceModel, cosine: Array) -> Array:
@@ -159,7 +161,7 @@ def _around_normal(model: FurnaceModel, cosine: float) -> float:
     root = np.hypot(along, cosine)
     # The root without the difference of two nearly equal numbers.
     horizon = np.where(along > 0, (along + root) / cosine, cosine / (root + np.abs(along)))
-    kinks = _kinks(along, cosine)
+    kinks = np.column_stack([_kinks(along, cosine), np.full(phi.size, model.edge)])
     total = 0.0
     view = _viewer(cosine)
     for rows in np.array_split(np.arange(phi.size), max(1, phi.size // _AZIMUTHS_AT_ONCE)):
@@ -277,8 +279,8 @@ def furnace_model(
     normalizer : str, optional
         Of modified Phong: a name in `mdfconv.brdf.reflection.NORMALIZERS`; "usual" by default.
     masking : str, optional
-        Of ggx and beckmann: a name in `mdfconv.brdf.microfacet.MASKINGS`; "correlated" by
-        default.
+        Of BRDFs that have the name of a distribution but smoothie and ashikhmin-shirley: a name in
+        `mdfconv.brdf.microfacet.MASKINGS`; "correlated" by default.
 
     Raises
     ------
@@ -290,7 +292,7 @@ def furnace_model(
     chosen = {option: value for option, value in options.items() if value is not None}
     for option in chosen:
         if option != definition.option:
-            others = " and ".join(other.name for other in _REGISTRY if other.option == option)
+            others = ", ".join(other.name for other in _REGISTRY if other.option == option)
             reason = _WITHOUT[option].format(definition.name)
             raise MdfconvError(reason, f"it can be chosen for {others}")
     return definition.build(float(parameter), **chosen)
@@ -326,8 +328,11 @@ def _facet_model(
         density = np.where(dot(view, m) > 0, density, 0)
         return reflect(view, m), reflected_density(density, view, m)
 
-    width = float(surface.distribution.peak_alpha(surface.parameter))
-    return FurnaceModel(brdf(surface, lossless, **options), width, False, sample)
+    width = float(surface.distribution.peak_alpha(parameter))
+    edge = surface.distribution.edge(np.array([parameter]))
+    # At m = 1 Schlick's is π/2, but for rounding.
+    end = np.inf if edge is None or edge[0] >= np.pi / 2 else float(np.tan(edge[0]))
+    return FurnaceModel(brdf(surface, lossless, **options), width, False, sample, end)
 
 
 def _mirror_model(brdf: Callable[..., Brdf], exponent: float, **options: str) -> FurnaceModel:
@@ -347,7 +352,9 @@ def _register(name: str, brdf: Callable[..., Brdf], owner: str = "", option: str
     definition = _Definition(name, build, option, owner)
     if owner == name:
         mdf = distribution(name)
-        _REGISTRY.add(name, definition, mdf.aliases, mdf.meant_by)
+        # A distribution's alias may be a BRDF of its own: phong.
+        aliases = [alias for alias in mdf.aliases if alias not in _REGISTRY.names]
+        _REGISTRY.add(name, definition, aliases, mdf.meant_by)
     else:
         meant = distribution("blinn-phong").meant_by if not owner else {}
         _REGISTRY.add(name, definition, meant_by=dict.fromkeys(meant, "phong"))
@@ -360,6 +367,8 @@ _register("modified-phong", reflection.modified, option="normalizer")
 _register("smoothie", reflection.smoothie, "smoothie")
 _register("smoothie-approx", reflection.smoothie_approx, "smoothie")
 _register("ashikhmin-shirley", reflection.ashikhmin_shirley, "ashikhmin-shirley")
+for _name in ("gauss", "schlick", "sawicki", "blinn-phong"):
+    _register(_name, _masked, _name, "masking")
 
 
 _COSINES = np.linspace(0, 1, 21)

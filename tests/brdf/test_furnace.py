@@ -85,6 +85,10 @@ def test_rough_surfaces_lose_more(name):
     [
         ("ggx", 0.5),
         ("beckmann", 0.4),
+        ("gauss", 0.5),
+        ("schlick", 0.6),
+        ("sawicki", 4.0),
+        ("blinn-phong", 8.0),
         ("smoothie", 0.8),
         ("smoothie-approx", 0.8),
         ("ashikhmin-shirley", 8.0),
@@ -102,8 +106,9 @@ def test_against_quadrature_over_light(name, parameter):
     for cosine in (0.3, 0.9):
         view = np.broadcast_to(direction(np.arccos(cosine)), light.shape)
         wanted = 2 * np.sum(model.brdf(light, view) * light[..., 2] * area)
-        # The grid cuts across the end of Phong's lobe, and where n·l = n·v.
-        tolerance = {"phong": 2e-4, "modified-phong": 2e-4, "ashikhmin-shirley": 2e-5}
+        # The grid cuts across the end of Phong's lobe and of Schlick's, and where n·l = n·v.
+        tolerance = dict.fromkeys(("phong", "modified-phong", "schlick"), 2e-4)
+        tolerance["ashikhmin-shirley"] = 2e-5
         got = directional_albedo(model, np.array([cosine]))[0]
         assert got == pytest.approx(wanted, abs=tolerance.get(name, 1e-6))
 
@@ -116,6 +121,15 @@ def test_sampling_agrees(name):
     exact = directional_albedo(model, cosine)
     got, error = sampled_albedo(model, cosine, 20_000, seed=5)
     assert (np.abs(got - exact) < 4.5 * error + 1e-9).all()
+
+
+@pytest.mark.parametrize("parameter", [0.02, 0.5, 0.95, 1.0])
+def test_the_end_of_a_support(parameter):
+    """Smith's masking makes no light, and a smooth surface loses none along the normal."""
+    albedo = directional_albedo(furnace_model("schlick", parameter), COSINES)
+    assert (albedo <= 1 + 1e-8).all()
+    if parameter == 0.02:
+        assert albedo[-1] == pytest.approx(1, abs=1e-8)
 
 
 def test_limits_of_smoothie():

@@ -721,7 +721,9 @@ def _smith_table(mdf: Distribution, parameter: float) -> SmithTable:
     one = np.array([parameter])
     edge = mdf.edge(one)
     end = None if edge is None else float(edge[0])
-    return smith_table(lambda beta: mdf._lobe(beta, one), float(mdf._peak_alpha(one)[0]), end)
+    # At the ends of a range kernels overflow on their way to a result.
+    with np.errstate(all="ignore"):
+        return smith_table(lambda beta: mdf._lobe(beta, one), float(mdf._peak_alpha(one)[0]), end)
 
 
 def _elementwise(function: Kernel, values: ArrayLike) -> Any:

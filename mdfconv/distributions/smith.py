@@ -118,7 +118,7 @@ def smith_table(lobe: Kernel, width: float, edge: float | None) -> SmithTable:
     parts = beyond / (power - 1), beyond * np.pi / (2 * power), beyond / (2 * power + 2)
     value += parts[0] * w - parts[1] + parts[2] / w
     linear += parts[0] * np.exp(top)
-    at_top = parts[0] - parts[1] + parts[2]
+    at_top = max(parts[0] - parts[1] + parts[2], 0.0)
     return SmithTable(top, (value @ to_coefficients).T.copy(), linear, inverse, at_top, power)
 
 

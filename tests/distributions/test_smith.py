@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from mdfconv.distributions import distribution, list_distributions
 from mdfconv.distributions.base import Distribution
 from tests import oracles
+from tests.distributions.cases import INSTANCES, parameters
 
 # Narrow lobes, wide ones, maxima off the normal, two scales, ends of the support.
 CASES = [
@@ -118,6 +119,16 @@ def test_ends_of_the_directions(name):
         many = mdf.smith_lambda(np.geomspace(1e-3, 1e8, 20_001), parameter)
         assert (many >= 0).all()
         assert (np.diff(many) >= -1e-10 * (1 + many[1:])).all()
+
+
+@pytest.mark.parametrize("label", INSTANCES)
+def test_hard_parameters(label):
+    tangent = np.array([0, 1e-8, 0.5, 5, 1e8, np.inf])
+    for parameter in parameters(INSTANCES[label]):
+        value = INSTANCES[label].smith_lambda(tangent, parameter)
+        assert (value >= 0).all()
+        assert (np.diff(value[:-1]) >= -1e-10 * (1 + value[1:-1])).all()
+        assert value[-1] == np.inf
 
 
 @pytest.mark.parametrize("shape", [(), (0,), (3, 0), (1, 1), (2, 3, 4)])

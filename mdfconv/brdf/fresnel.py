@@ -54,7 +54,9 @@ def dielectric(cosine: ArrayLike, ior: float) -> Array:
     MdfconvError
         If the index is not a positive finite number.
     """
-    return _unpolarized(cosine, complex(check_index(ior)))
+    index = check_index(ior)
+    # Only from the inside is there a critical angle, beyond which the root is imaginary.
+    return _unpolarized(cosine, index if index > 1 else complex(index))
 
 
 def conductor(cosine: ArrayLike, eta: float, k: float) -> Array:
@@ -80,7 +82,7 @@ def conductor(cosine: ArrayLike, eta: float, k: float) -> Array:
     """
     if not (np.isfinite(k) and k >= 0):
         raise MdfconvError(f"the extinction coefficient is at least 0, not {k:g}")
-    return _unpolarized(cosine, complex(check_index(eta), k))
+    return _unpolarized(cosine, complex(check_index(eta), k)) if k else dielectric(cosine, eta)
 
 
 def check_index(ior: float) -> float:
@@ -90,7 +92,7 @@ def check_index(ior: float) -> float:
     return float(ior)
 
 
-def _unpolarized(cosine: ArrayLike, index: complex) -> Array:
+def _unpolarized(cosine: ArrayLike, index: complex | float) -> Array:
     """Return ½ (|r_s|² + |r_p|²) for m = `index`.
 
     With z = √(m² − 1 + c²) the usual r_s = (c − z)/(c + z) and r_p = (m²c − z)/(m²c + z) become,

@@ -116,7 +116,7 @@ def furnace_brdfs(incomplete: str) -> list[str]:
 
 def fresnel_factors() -> list[str]:
     """Return the Fresnel factors that are fitted; an index is a number of one's own."""
-    from mdfconv.measured.brdf_fit import FRESNELS
+    from mdfconv.measured.model import FRESNELS
 
     return [name.removesuffix("N") for name in FRESNELS]
 

@@ -14,20 +14,23 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from mdfconv.cli import completion, options, process, tables
-from mdfconv.cli.options import Format, argument, flag, option
+from mdfconv.cli.options import argument, flag, option
 from mdfconv.cli.outputs import Outputs
 from mdfconv.errors import MdfconvError
-from mdfconv.output.records import cell_text
+from mdfconv.output.records import with_error
 from mdfconv.registry import ALL
 
 if TYPE_CHECKING:
-    from mdfconv.distributions import Distribution
     from mdfconv.distributions.endpoint import Endpoint
     from mdfconv.measured import Analysis, ReadOptions
+    from mdfconv.measured.model import Candidate
 
-# What a narrow terminal and the page of fits to two directions show first.
-_CHIEF = ("file", "channel", "distribution", "parameter", "gamma", "rmse", "simplest")
-_SECOND = ("stderr", "error", "reflectance", "diffuse", "specular", "masking")
+# The name of the mixture of two lobes, as `mdfconv.measured.model` has it.
+TWO_LOBES = "ggx+ggx"
+# What a narrow terminal leaves out first, from the end.
+_SECONDARY = ("k_s", "n", "validated error", "F₀")
+# Of more channels a table for people has the range.
+_MOST_CHANNELS = 3
 
 
 def _column(what: str, otherwise: str = "") -> Any:
@@ -53,28 +56,30 @@ _ANGLE_UNIT = option(
     "UNIT", "degrees, radians or cosine; by default from the header.", words=completion.angle_units
 )
 _CELLS = option("N", "Of a MERL file: N cells of the whole, not the slice θ_d ≈ 0.", min=1)
-_MAX_ANGLE = option("DEG", "Leave out larger angles; 80 by default for brdf at θ_d ≈ 0.")
+_MAX_ANGLE = option("DEG", "Leave out larger angles; default 80, of an ndf 90.")
 _SEPARATE = flag("--separate", "Fit every channel on its own, not with one parameter.")
 _LOSS = typer.Option(
-    help="Squared residuals, those of logarithms, or of two directions those of f_r "
-    "cos θ_i cos θ_o."
+    help="What is squared: differences of logarithms, of values, and of two directions of "
+    "f_r cos θ_i cos θ_o or of the cube roots of f_r cos θ_o."
 )
-_MASKING = typer.Option(
-    help="Of two directions: smith, where a distribution has its Λ, else v-cavity; or one for all."
-)
+_MASKING = typer.Option(help="Of two directions: smith (default), v-cavity or none.")
 _FRESNEL = option(
     "F",
-    "Of two directions: none (default), schlick (F₀ 0.04), ior:N, or fit (F₀ free).",
+    "Of two directions: auto (default; dielectric or metal, by BIC), dielectric (n is fitted), "
+    "metal (F₀ of each channel is fitted), ior:N, or none (F = 1, k_s is fitted).",
     words=completion.fresnel_factors,
 )
-_ROBUST = flag("--robust", "Of two directions: let outliers count less.")
+_FREE_SPECULAR = flag("--free-specular", "Of two directions: fit k_s, too, which else is 1.")
+_NO_ROBUST = flag("--no-robust", "Let outliers count fully.")
+_APERTURE = option("DEG", "Of two directions: diameter of the detector, over which to average.")
+_NOISE = option("SHARE", "Relative standard deviation of values, such as 2% or 0.02.")
+_FLOOR = option("VALUE", "Absolute standard deviation of values, 1/sr.")
 _GAMMA = option(
     "G",
     "Second parameter, of gtr and student-t, as a number that is kept; free, or not "
     "given, it is fitted.",
 )
-_TOLERANCE = option("T", "How much worse than the best the simplest may be.")
-_REPORT = option("FILE", "Write a page for a colleague: .html, or .md with its pictures.")
+_REPORT = option("FILE", "Write a report: .html, or .md with its pictures.")
 
 
 def command(
@@ -92,12 +97,15 @@ def command(
     cells: Annotated[int | None, _CELLS] = None,
     max_angle: Annotated[float | None, _MAX_ANGLE] = None,
     separate: Annotated[bool, _SEPARATE] = False,
-    loss: Annotated[Literal["linear", "log", "cosine"], _LOSS] = "linear",
+    loss: Annotated[Literal["log", "linear", "cosine", "cube-root"], _LOSS] = "log",
     masking: Annotated[Literal["smith", "v-cavity", "none"] | None, _MASKING] = None,
     fresnel: Annotated[str | None, _FRESNEL] = None,
-    robust: Annotated[bool, _ROBUST] = False,
+    free_specular: Annotated[bool, _FREE_SPECULAR] = False,
+    no_robust: Annotated[bool, _NO_ROBUST] = False,
+    aperture: Annotated[float | None, _APERTURE] = None,
+    noise: Annotated[str | None, _NOISE] = None,
+    floor: Annotated[float | None, _FLOOR] = None,
     gamma: Annotated[str | None, _GAMMA] = None,
-    tolerance: Annotated[float, _TOLERANCE] = 0.05,
     format_: options.FormatOption = None,
     output: options.OutputOption = None,
     png: options.PngOption = None,
@@ -106,32 +114,35 @@ def command(
 ) -> None:
     """Fit distributions to measured reflectance or to a measured distribution of normals.
 
-    Of one angle, that of the half vector, the model is offset + scale · D̄(β); of two directions
-    k_d/π + k_s D G F / (4 cos θ_i cos θ_o). A second parameter is fitted, too, unless --gamma
-    gives it. Samples of two directions that are exactly 0 are left out: the detector was in the
-    way of the light. Ranks the fits, best first, and marks the simplest one that is nearly as good.
-    Several files make one table.
+    Of two directions the model is k_d/π + k_s D G F / (4 cos θ_i cos θ_o) with k_s = 1: F carries
+    the strength of the reflection, as a dielectric's or a metal's. Of one angle, that of the half
+    vector, it is offset + scale · D̄(β). Samples of 0 or less are left out. Recommends the simplest
+    distribution whose error, at angles of incidence that were left out, is within one standard
+    error of the least one, and says how well it describes the surface. ggx+ggx is the mixture of
+    two GGX lobes. Several files make one table and one report.
 
     Examples:
+
+    mdfconv fit paint.csv --report paint.html
 
     mdfconv fit gold.binary
 
     mdfconv fit lobe.csv --to ggx --to beckmann --png lobe.png
 
-    mdfconv fit scan.txt --angle theta --angle-unit degrees --values red --loss log
+    mdfconv fit detector.csv --incidence 45
 
-    mdfconv fit paint.csv --loss log --fresnel fit --report paint.html
+    mdfconv fit scan.txt --angle theta --angle-unit degrees --values red --loss linear
 
     mdfconv fit '*.csv' --format csv -o fits.csv
     """
     from mdfconv.measured import ReadOptions
-    from mdfconv.measured.brdf_fit import BrdfModel
+    from mdfconv.measured.model import BrdfModel
     from mdfconv.output.files import find_files
 
     files = find_files(data)
     outputs = Outputs(png, report, table=output, force=force, inputs=files)
-    if len(files) > 1 and (png or report):
-        raise MdfconvError("--png and --report are of one file")
+    if len(files) > 1 and png:
+        raise MdfconvError("--png is of one file", "--report takes several")
     if report:
         from mdfconv.measured.report import check_report_name
 
@@ -139,57 +150,62 @@ def command(
     ends = _ends(targets or [])
     fixed = options.chosen_gamma(gamma)
     shape = fixed if isinstance(fixed, float) else None
+    share = None if noise is None else options.share(noise, "noise")
+    model = BrdfModel(
+        loss, masking or "smith", fresnel or "auto", free_specular, not no_robust, aperture, share,
+        floor,
+    )  # fmt: skip
     settings = {
-        "targets": _targets(ends, shape),
+        "targets": _targets(targets or [], ends, shape),
         "gamma": shape,
-        **vars(BrdfModel(loss, masking or "smith", fresnel or "none", robust)),
+        **vars(model),
         "quantity": quantity,
         "max_angle": max_angle,
         "separate": separate,
-        "tolerance": tolerance,
     }
     columns = ReadOptions(
         angle, theta_i, phi_i, theta_o, phi_o, tuple(values or ()), angle_unit, angle_is, cells
     )
-    needs_two = bool(masking or fresnel or robust or loss == "cosine")
+    directional = {
+        "masking": masking, "fresnel": fresnel, "free-specular": free_specular,
+        "aperture": aperture, "noise": noise, "floor": floor,
+        "loss cosine": loss == "cosine", "loss cube-root": loss == "cube-root",
+    }  # fmt: skip
+    needs_two = [f"--{name}" for name, given in directional.items() if given]
     work = partial(_analysis, columns=columns, settings=settings, needs_two=needs_two)
     analyses = [work(files[0])] if len(files) == 1 else _in_processes(work, files)
-    names, rows = _table(analyses, ends, separate=separate)
     contents: dict[Path, bytes] = {}
-    logarithms = loss == "log"
     if png:
         from mdfconv.measured.figures import draw_analysis
 
-        contents[png] = draw_analysis(analyses[0], logarithms=logarithms)
+        contents[png] = draw_analysis(analyses[0])
     if report:
         from mdfconv.measured.report import report_files
 
         line = join(["mdfconv", *sys.argv[1:]])
-        texts = _shown(rows, "markdown")
-        contents |= report_files(
-            analyses[0], texts, line, report, chief=_CHIEF + _SECOND, logarithms=logarithms
-        )
-    title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
-    ranked = "log_rmse" if logarithms and "log_rmse" in names else "rmse"
-    minor = [*_SECOND, *(name for name in names if name not in _CHIEF + _SECOND), "rmse"]
-    minor.remove(ranked)
+        contents |= report_files(analyses, line, report, dict(zip(files, analyses, strict=True)))
     form = tables.form_of(format_, output)
-    shown = _shown(rows, form)
-    tables.write_table(names, shown, form, outputs, beside=contents, title=title, secondary=minor)
+    rows = _rows(analyses, ends, separate=separate, for_people=form in ("table", "markdown"))
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    rows = [{name: row.get(name) for name in names} for row in rows]
+    title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
+    tables.write_table(
+        names, rows, form, outputs, beside=contents, title=title, secondary=_SECONDARY[::-1]
+    )
     for analysis in analyses:
-        _tell(analysis, tolerance, named=len(analyses) > 1)
+        _tell(analysis, named=len(analyses) > 1)
 
 
 def _analysis(
-    path: Path, columns: ReadOptions, settings: dict[str, Any], *, needs_two: bool
+    path: Path, columns: ReadOptions, settings: dict[str, Any], *, needs_two: Sequence[str]
 ) -> Analysis:
     """Return the fits to a file."""
     from mdfconv.measured import Samples, fit, read
 
     samples = read(path, columns)
     if needs_two and isinstance(samples, Samples):
-        reason = "--masking, --fresnel, --robust and --loss cosine need two directions"
-        raise MdfconvError(f"{path}: {reason}", "this file has one angle")
+        which = f"{' and '.join(needs_two)} {'need' if len(needs_two) > 1 else 'needs'}"
+        raise MdfconvError(f"{path}: {which} two directions", "this file has one angle")
     return fit(samples, name=path.name, **settings)
 
 
@@ -206,49 +222,71 @@ def _in_processes(work: Callable[[Path], Analysis], files: Sequence[Path]) -> li
     return analyses
 
 
-def _table(
-    analyses: Sequence[Analysis], ends: Sequence[Endpoint], *, separate: bool
-) -> tuple[list[str], list[dict[str, Any]]]:
-    """Return the names of the columns and a row for each fit."""
+def _rows(
+    analyses: Sequence[Analysis], ends: Sequence[Endpoint], *, separate: bool, for_people: bool
+) -> list[dict[str, Any]]:
+    """Return a row for each fit: for people with symbols, units and ±, else as a record."""
     rows = []
     for analysis in analyses:
         file = {"file": analysis.name} if len(analyses) > 1 else {}
         for result in analysis.results:
             channel = {"channel": result.samples.channels[0]} if separate else {}
             records = options.in_asked_forms(result.records(), ends)
+            if for_people:
+                records = [_row_for_people(record) for record in records]
             rows += [file | channel | record for record in records]
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    return names, [{name: row.get(name) for name in names} for row in rows]
+    return rows
 
 
-def _shown(rows: list[dict[str, Any]], form: Format) -> list[dict[str, Any]]:
-    """Return the records for the form: lists and nulls where they have a place, else text."""
-    if form in ("json", "table"):
-        return rows
-    number = cell_text if form == "markdown" else repr
+def _row_for_people(record: dict[str, Any]) -> dict[str, Any]:
+    """Return the chief numbers of a record, each with its standard error."""
+    row = {
+        "": "✓" if record["recommended"] else "",
+        "distribution": record["distribution"],
+        "parameter": _measured(record, "parameter"),
+        "γ": _measured(record, "gamma"),
+    }
+    if "second" in record:
+        second, share = _measured(record, "second"), _measured(record, "share")
+        row["parameter"] += f", {second}, share {share}"
+    symbols = {"f0": "F₀", "n": "n", "diffuse": "k_d", "specular": "k_s"}
+    for name, symbol in symbols.items() | {("offset", "offset"), ("scale", "scale")}:
+        if name in record:
+            row[symbol] = _measured(record, name)
+    is_relative = record["loss"] == "log"
+    for name, heading in (("error", "error"), ("validated_error", "validated error")):
+        value = record[name]
+        row[heading] = f"{100 * value:.3g} %" if is_relative else f"{value:.3g}"
+    return row
 
-    def text(value: Any) -> Any:
-        if isinstance(value, list):
-            return " ".join(map(number, value))
-        return "" if value is None else value
 
-    return [{name: text(value) for name, value in row.items()} for row in rows]
+def _measured(record: dict[str, Any], name: str) -> str:
+    """Return a number of a record with its standard error, of many channels their range."""
+    value, error = record[name], record.get(f"{name}_stderr")
+    if value is None:
+        return ""
+    if not isinstance(value, list):
+        return with_error(value, error)
+    if len(value) > _MOST_CHANNELS:
+        return f"{min(value):.3g} to {max(value):.3g}"
+    pairs = zip(value, error or [None] * len(value), strict=True)
+    return ", ".join(with_error(*pair) for pair in pairs)
 
 
-def _tell(analysis: Analysis, tolerance: float, *, named: bool) -> None:
-    """Write notes and verdicts to standard error."""
+def _tell(analysis: Analysis, *, named: bool) -> None:
+    """Write notes, verdicts and failed checks to standard error."""
     file = f"{analysis.name}: " if named else ""
     for note in analysis.notes:
         process.tell(f"{file}note: {note}")
     for result in analysis.results:
         channels = result.samples.channels
         channel = f"channel {channels[0]}: " if len(analysis.results) > 1 else ""
-        cheap = result.simplest.distribution
-        process.tell(
-            f"{file}{channel}best is {result.fits[0].distribution.name}; simplest within "
-            f"{100 * tolerance:g} % of its error is {cheap.name}, at {cheap.operations} "
-            "operations an evaluation"
-        )
+        verdict = result.verdict
+        process.tell(f"{file}{channel}{verdict.grade}: {verdict.sentence}")
+        for check in result.checks:
+            if check.passed is False:
+                hint = f" (--{check.argument.replace('_', '-')})" if check.argument else ""
+                process.tell(f"{file}{channel}warning: {check.name}: {check.text}{hint}")
 
 
 def _ends(names: Sequence[str]) -> list[Endpoint]:
@@ -257,17 +295,23 @@ def _ends(names: Sequence[str]) -> list[Endpoint]:
 
     if ALL in [name.strip().lower() for name in names]:
         return []
-    ends = (options.noted(endpoint(name)) for name in names)
+    ends = (options.noted(endpoint(name)) for name in names if name != TWO_LOBES)
     return list({end.label: end for end in ends}.values())
 
 
-def _targets(ends: Sequence[Endpoint], gamma: float | None) -> list[Distribution]:
-    """Return the distributions to fit, and say which of all a given γ leaves out."""
-    from mdfconv.measured.analysis import fitted_distributions
+def _targets(
+    names: Sequence[str], ends: Sequence[Endpoint], gamma: float | None
+) -> list[Candidate] | None:
+    """Return the candidates to fit, None for all, and say which of all a given γ leaves out."""
+    from mdfconv.measured.analysis import fitted_candidates
 
-    named = list(dict.fromkeys(end.distribution for end in ends))
-    targets = fitted_distributions(named, gamma)
-    for mdf in () if named else fitted_distributions(None, None):
-        if mdf not in targets:
-            process.tell(f"note: {mdf.name} is left out: it has no γ = {gamma:g}")
-    return targets
+    named: list[Any] = list(dict.fromkeys(end.distribution for end in ends))
+    named += [TWO_LOBES] * (TWO_LOBES in names)
+    if named:
+        return fitted_candidates(named, gamma)
+    if gamma is not None:
+        left = {what.name for what in fitted_candidates(None, gamma)}
+        for what in fitted_candidates(None, None):
+            if what.name not in left:
+                process.tell(f"note: {what.name} is left out: it has no γ = {gamma:g}")
+    return None

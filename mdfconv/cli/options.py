@@ -180,6 +180,15 @@ def chosen_gamma(text: str | None) -> Gamma:
         raise MdfconvError(reason, percent_hint(text)) from None
 
 
+def share(text: str, name: str) -> float:
+    """Return a share that is given as a number or in per cent; raise if it is none."""
+    number = text.strip()
+    try:
+        return float(number[:-1]) / 100 if number.endswith("%") else float(number)
+    except ValueError:
+        raise MdfconvError(f"the {name} '{text}' is no number", "such as 2% or 0.02") from None
+
+
 def noted(end: Endpoint) -> Endpoint:
     """Return what an option names; what to know of the name goes to standard error, once."""
     if end.caution:
@@ -197,7 +206,7 @@ def in_asked_forms(
 ) -> list[dict[str, Any]]:
     """Return rows of results with each parameter, and its error, in the forms asked for.
 
-    A row has a ``distribution`` by name, its ``parameter``, and perhaps the ``stderr``; one of
+    A row has a ``distribution`` by name, its ``parameter``, and perhaps the ``parameter_stderr``; one of
     another distribution stays as it is.
     """
     rows_asked = []
@@ -212,6 +221,7 @@ def _stored(row: dict[str, Any], end: Endpoint) -> dict[str, Any]:
         return {}
     value, slope = end.encode_one(row["parameter"])
     stored: dict[str, Any] = {"distribution": end.label, "parameter": value}
-    if row.get("stderr") is not None:
-        stored["stderr"] = None if slope is None else slope * row["stderr"]
+    error = row.get("parameter_stderr")
+    if error is not None:
+        stored["parameter_stderr"] = None if slope is None else slope * error
     return stored

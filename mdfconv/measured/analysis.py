@@ -1,21 +1,60 @@
-"""Everything that is fitted to one set of measurements, ranked."""
+"""Everything that is fitted to one set of measurements: ranked, validated, judged."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from mdfconv.distributions import Distribution, distribution, one_parameter_distributions
+from mdfconv.distributions import Distribution
+from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.brdf_fit import BrdfModel, MeasuredFit, fit_distribution
-from mdfconv.measured.samples import DirectionalSamples, Measurements, note_of
+from mdfconv.measured.brdf_fit import MeasuredFit, fit_distribution
+from mdfconv.measured.checks import Check, Verdict, checks_of, verdict_of
+from mdfconv.measured.model import (
+    AUTO,
+    DIELECTRIC,
+    LOSSLESS,
+    METAL,
+    TWO_LOBES,
+    BrdfModel,
+    Candidate,
+    all_candidates,
+    candidate,
+)
+from mdfconv.measured.samples import DirectionalSamples, Measurements, Samples, note_of
+from mdfconv.measured.scans import estimate_noise
+from mdfconv.measured.validation import IncidenceFit, by_incidence, validated
 
-# Beyond it the masking that a slice at θ_d = 0 leaves out is large, degrees.
-_BRDF_LIMIT = 80.0
+# Beyond it the readings of goniometers fall off, and masking is large, degrees.
+BRDF_LIMIT = 80.0
 _HORIZON = 90.0
+# To this limit fits are repeated, to see how far it moves them.
+_NARROW_LIMIT = 60.0
+# A shape of more parameters whose error is not less by this is the simpler one again.
+_SAME_SHAPE = 0.99
+# Choices are compared on so many samples at most.
+_MOST_SAMPLES = 5_000
+_SEED = 2
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The recommended fit under other options.
+
+    Parameters
+    ----------
+    what : str
+        The option that differs.
+    fit : MeasuredFit
+        The fit.
+    """
+
+    what: str
+    fit: MeasuredFit
 
 
 @dataclass(frozen=True)
@@ -26,19 +65,65 @@ class ChannelFits:
     ----------
     samples : Samples or DirectionalSamples
         The channels.
-    fits : list of MeasuredFit
-        The fits, best first.
-    simplest : MeasuredFit
-        The simplest one that is nearly as good as the best.
+    fits : sequence of MeasuredFit
+        The fits of distinct shapes, the least error at samples that were left out first.
+    recommended : MeasuredFit
+        The fit with the fewest parameters whose validated error is within one standard error of
+        the best one's.
     """
 
     samples: Measurements
     fits: Sequence[MeasuredFit]
-    simplest: MeasuredFit
+    recommended: MeasuredFit
+
+    @cached_property
+    def log_ratio(self) -> Array:
+        """ln(fit/data) of the recommended fit, shape (n, channels); NaN where one is not positive."""
+        near = self.recommended.model(self.samples)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.log(near / self.samples.values)
+        return np.where(np.isfinite(ratio), ratio, np.nan)
+
+    @cached_property
+    def noise(self) -> float:
+        """The relative standard deviation of the samples from their neighbours."""
+        return estimate_noise(self.samples, self.log_ratio)
+
+    @cached_property
+    def error(self) -> float:
+        """The relative error: the robust root mean square of ln(fit/data)."""
+        weight = np.where(np.isfinite(self.log_ratio), self.recommended.weights[:, None], 0)
+        square = np.square(np.nan_to_num(self.log_ratio))
+        return float(np.sqrt((weight * square).sum() / max(weight.sum(), 1e-300)))
+
+    @cached_property
+    def by_incidence(self) -> list[IncidenceFit]:
+        """The recommended lobe of each angle of incidence alone; none of one angle."""
+        return by_incidence(self.samples, self.recommended)
+
+    @cached_property
+    def choices(self) -> list[Choice]:
+        """The recommended fit as it is, then under other losses, angles and models."""
+        return [Choice("as recommended", self.recommended), *_choices(self)]
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """How well the recommended fit describes the samples."""
+        return verdict_of(self)
+
+    @cached_property
+    def checks(self) -> list[Check]:
+        """What can be wrong with the measurements, the model, or the numbers."""
+        return checks_of(self)
 
     def records(self) -> list[dict[str, Any]]:
-        """Return a record of each fit."""
-        return [fit.record() | {"simplest": fit is self.simplest} for fit in self.fits]
+        """Return a record of each fit; verdict and checks are those of the recommended one."""
+        checks = [{"name": c.name, "passed": c.passed, "text": c.text} for c in self.checks]
+        judged = {"recommended": True, "verdict": self.verdict.grade, "checks": checks}
+        other = {"recommended": False, "verdict": None, "checks": None}
+        return [
+            fit.record() | (judged if fit is self.recommended else other) for fit in self.fits
+        ]
 
 
 @dataclass(frozen=True)
@@ -53,82 +138,63 @@ class Analysis:
         Those that were used.
     results : list of ChannelFits
         One, or one for each channel.
+    settings : BrdfModel
+        The options.
     """
 
     name: str
     samples: Measurements
     results: list[ChannelFits]
+    settings: BrdfModel
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out and assumed, and what the fits do not tell."""
-        texts = [
-            note if fit.masking is None else f"{fit.distribution.name}: {note}"
-            for result in self.results
-            for fit in result.fits
-            for note in fit.notes
-        ]
-        return (*self.samples.notes, *self._impossible, *dict.fromkeys(texts))
-
-    @property
-    def _impossible(self) -> Iterator[str]:
-        """What no surface can be."""
-        best = (result.fits[0] for result in self.results)
-        largest = max(max(fit.linear.get("diffuse", (0.0,))) for fit in best)
-        if largest > 1:
-            yield (
-                f"k_d {largest:.3g} is more light than falls on the surface: the values are not "
-                "f_r in 1/sr but, for example, π f_r"
-            )
+        """What was left out and assumed."""
+        return self.samples.notes
 
 
 def fit(
     samples: Measurements,
-    targets: Sequence[str | Distribution] | None = None,
+    targets: Sequence[str | Distribution | Candidate] | None = None,
     *,
     gamma: float | None = None,
-    loss: str = "linear",
-    masking: str = "smith",
-    fresnel: str = "none",
-    robust: bool = False,
     quantity: str | None = None,
     max_angle: float | None = None,
     separate: bool = False,
-    tolerance: float = 0.05,
     name: str = "samples",
+    **options: Any,
 ) -> Analysis:
-    """Fit distributions to measurements, and rank them.
+    """Fit distributions to measurements, and recommend one.
 
     Of one angle, that of the half vector, the model is offset + scale · D̄(β), divided by cos²β
-    for a BRDF; of two directions it is k_d/π + k_s D G F / (4 cos θ_i cos θ_o), and samples that
-    are exactly 0 are left out.
+    for a BRDF; of two directions it is k_d/π + k_s D G F / (4 cos θ_i cos θ_o), k_s = 1.
 
     Parameters
     ----------
     samples : Samples or DirectionalSamples
         The measurements, as `mdfconv.measured.read` returns them.
     targets : sequence of str or Distribution, optional
-        The distributions to fit; all if not given.
+        The distributions to fit; if not given each shape once, and ``"ggx+ggx"``, the mixture of
+        two GGX lobes.
     gamma : float, optional
         γ of those that have one; it is fitted if not given.
-    loss, masking, fresnel, robust
-        As in `BrdfModel`; of one angle only the loss applies.
     quantity : str, optional
         ``"ndf"`` or ``"brdf"`` of one angle; as the samples say if not given.
     max_angle : float, optional
-        The largest angle that is used, degrees: from the normal to the half vector, and of two
-        directions to each of them. If not given, 80 for a BRDF of one angle, and all else.
+        The largest angle that is used, degrees: of two directions that of each of them, of one
+        angle that from the normal to the half vector. If not given, 80 for a BRDF and 90 for a
+        distribution of normals.
     separate : bool
         Whether each channel has parameters of its own.
-    tolerance : float
-        How much worse than the best, relatively, the simplest good fit may be.
     name : str
         What was measured, for messages.
+    **options
+        Those of `BrdfModel`: loss, masking, fresnel, free_specular, robust, aperture, noise, floor.
 
     Returns
     -------
     Analysis
-        The fits, best first, with standard errors, and notes.
+        The fits with standard errors, the recommended one, its verdict and checks.
 
     Raises
     ------
@@ -143,64 +209,140 @@ def fit(
     >>> beta = np.radians(np.arange(0.0, 80.0, 2.0))
     >>> values = 0.1 + 3 * distribution("ggx").unit(beta, 0.25)
     >>> analysis = fit(Samples(beta, values[:, None], ("green",), "ndf"), ["beckmann", "ggx"])
-    >>> best = analysis.results[0].fits[0]
-    >>> best.distribution.name, round(best.parameter, 6)
+    >>> best = analysis.results[0].recommended
+    >>> best.name, round(best.parameter, 6)
     ('ggx', 0.25)
     """
-    if not tolerance >= 0:
-        raise MdfconvError(
-            f"a tolerance of {tolerance:g} is negative", "give 0 or more", argument="tolerance"
-        )
     if max_angle is not None and not 0 < max_angle <= _HORIZON:
         raise MdfconvError(
             f"no angles up to {max_angle:g} degrees", "above 0 and at most 90", argument="max_angle"
         )
-    model = BrdfModel(loss, masking, fresnel, robust)
-    distributions = fitted_distributions(targets, gamma)
-    used = _without_shadow(_restricted(name, samples, quantity, max_angle), loss)
-    results = []
+    model = BrdfModel(**options)
+    candidates = fitted_candidates(targets, gamma)
+    used = _restricted(name, samples, quantity, max_angle)
+    used = _positive(name, used, model)
     try:
-        for part in _channels(used) if separate else [used]:
-            fits = rank([fit_distribution(part, mdf, model, gamma=gamma) for mdf in distributions])
-            results.append(ChannelFits(part, fits, simplest(fits, tolerance)))
+        parts = _channels(used) if separate else [used]
+        results = [_fitted(part, candidates, model, is_asked=bool(targets)) for part in parts]
     except MdfconvError as error:
         raise MdfconvError(f"{name}: {error}") from None
-    return Analysis(name, used, results)
+    return Analysis(name, used, results, model)
 
 
-def rank(fits: Sequence[MeasuredFit]) -> list[MeasuredFit]:
-    """Return fits by their error, the smallest first."""
-    return sorted(fits, key=lambda fit: fit.error)
+def _fitted(
+    samples: Measurements, candidates: Sequence[Candidate], model: BrdfModel, *, is_asked: bool
+) -> ChannelFits:
+    """Return the fits of all candidates that the samples are enough for."""
+    fits, errors = [], []
+    for what in candidates:
+        try:
+            fits.append(fit_distribution(samples, what, model))
+        except MdfconvError as error:
+            errors.append(error)
+            if is_asked:
+                raise
+    if not fits:
+        raise errors[0]
+    if not is_asked:
+        fits = distinct(fits)
+    fits = [validated(samples, one) for one in fits]
+    return ChannelFits(samples, ranked(fits), recommended(fits))
 
 
-def simplest(fits: Sequence[MeasuredFit], tolerance: float) -> MeasuredFit:
-    """Return the cheapest of fits whose error is within a relative tolerance of the best.
+def distinct(fits: Sequence[MeasuredFit]) -> list[MeasuredFit]:
+    """Return fits without those that are a simpler one again: γ = 2 is GGX, γ → ∞ Beckmann."""
+    return [
+        one
+        for one in fits
+        if not any(
+            other.size < one.size and one.error > _SAME_SHAPE * other.error for other in fits
+        )
+    ]
 
-    Cheapest has the fewest parameters, then the fewest operations per evaluation.
+
+def ranked(fits: Sequence[MeasuredFit]) -> list[MeasuredFit]:
+    """Return fits by their error at samples that were left out, the smallest first."""
+    return sorted(fits, key=lambda fit: fit.comparable_error)
+
+
+def recommended(fits: Sequence[MeasuredFit]) -> MeasuredFit:
+    """Return the simplest fit whose validated error is within one standard error of the best.
+
+    The simplest has the fewest parameters; of several those whose masking has a closed form, which
+    renderers have, are simpler; of several still the one with the least error.
     """
-    best = min(fit.error for fit in fits)
-    good = [fit for fit in fits if fit.error <= (1 + tolerance) * best]
-    return min(good, key=lambda fit: (len(fit.parameters), fit.distribution.operations))
+    best = ranked(fits)[0]
+    limit = best.comparable_error + np.nan_to_num(best.validated_spread)
+    good = [fit for fit in fits if fit.comparable_error <= limit]
+    return min(
+        good, key=lambda fit: (fit.size, not fit.distribution.smith, fit.comparable_error)
+    )
 
 
-def fitted_distributions(
-    targets: Sequence[str | Distribution] | None, gamma: float | None
-) -> list[Distribution]:
-    """Return the distributions that are named, or all those that a given γ leaves legal.
+def fitted_candidates(
+    targets: Sequence[str | Distribution | Candidate] | None, gamma: float | None
+) -> list[Candidate]:
+    """Return what is named, or all shapes; γ that is given applies to those that have one.
 
     Raises `MdfconvError` if γ is given and means nothing for those that are named.
     """
-    named = [distribution(mdf) if isinstance(mdf, str) else mdf for mdf in targets or ()]
-    chosen = named or one_parameter_distributions()
+    named = [candidate(target) for target in targets or ()]
+    chosen = named or all_candidates()
     if gamma is None:
         return chosen
-    second = {mdf: mdf.second_parameter for mdf in chosen if mdf.second_parameter}
+    second = [what for what in chosen if what.distribution.second_parameter]
     if not second:
         raise MdfconvError(f"{chosen[0].name} has one parameter and no γ")
-    illegal = [mdf for mdf, range_ in second.items() if not range_.accepts(np.asarray(gamma))]
+    illegal = [
+        what
+        for what in second
+        if not what.distribution.second_parameter.accepts(np.asarray(gamma))  # type: ignore[union-attr]
+    ]
     if illegal and (named or len(illegal) == len(second)):
-        illegal[0].with_gamma(gamma)  # says what is legal
-    return [mdf for mdf in chosen if mdf not in illegal]
+        illegal[0].distribution.with_gamma(gamma)  # says what is legal
+    return [
+        candidate(what.distribution, gamma) if what.is_gamma_free else what
+        for what in chosen
+        if what not in illegal
+    ]
+
+
+def _choices(result: ChannelFits) -> list[Choice]:
+    """Return the recommended fit under other options, on some of the samples if there are many."""
+    fit, samples = result.recommended, result.samples
+    count = len(samples.values)
+    if count > _MOST_SAMPLES:
+        index = np.random.default_rng(_SEED).choice(count, _MOST_SAMPLES, replace=False)
+        samples = samples.select(np.sort(index))
+    options = replace(fit.options, fresnel=fit.fresnel or AUTO)
+    trials: list[tuple[str, Measurements, Candidate, dict[str, Any]]] = []
+    if isinstance(samples, Samples):
+        other = "linear" if options.loss == "log" else "log"
+        trials.append((f"{other} loss", samples, fit.what, {"loss": other}))
+    else:
+        for loss in ("log", "cube-root", "cosine"):
+            if loss != options.loss:
+                trials.append((f"{loss} loss", samples, fit.what, {"loss": loss}))
+        near = np.minimum(samples.incident[:, 2], samples.outgoing[:, 2])
+        inner = samples.select(near >= np.cos(np.radians(_NARROW_LIMIT)))
+        trials.append((f"angles up to {_NARROW_LIMIT:g}°", inner, fit.what, {}))
+        kinds = {DIELECTRIC: METAL, METAL: DIELECTRIC}
+        if fit.fresnel in kinds:
+            other = kinds[fit.fresnel]
+            trials.append((f"F of a {other}", samples, fit.what, {"fresnel": other}))
+        if not options.free_specular and fit.fresnel != LOSSLESS:
+            trials.append(("k_s free", samples, fit.what, {"free_specular": True}))
+    if fit.what.is_double or fit.distribution.name == "ggx":
+        other_shape = candidate("ggx" if fit.what.is_double else TWO_LOBES)
+        label = "one lobe" if fit.what.is_double else "two lobes"
+        trials.append((label, samples, other_shape, {}))
+    choices = []
+    for label, some, what, changes in trials:
+        try:
+            choices.append(Choice(label, fit_distribution(some, what, replace(options, **changes))))
+        except MdfconvError:
+            continue
+    return choices
 
 
 def _restricted(
@@ -209,13 +351,13 @@ def _restricted(
     """Return the samples up to the largest angle, and say what is left out."""
     notes = samples.notes
     if isinstance(samples, DirectionalSamples):
-        limit = max_angle or _HORIZON
+        limit = max_angle or BRDF_LIMIT
         lowest = np.minimum(samples.incident[:, 2], samples.outgoing[:, 2])
         keep = lowest >= np.cos(np.radians(limit)) * (1 - 1e-12)
     else:
         samples = replace(samples, quantity=quantity or samples.quantity)
         is_brdf = samples.quantity == "brdf"
-        limit = max_angle or (_BRDF_LIMIT if is_brdf else _HORIZON)
+        limit = max_angle or (BRDF_LIMIT if is_brdf else _HORIZON)
         keep = samples.beta <= np.radians(limit) * (1 + 1e-12)
         if is_brdf:
             notes = (*notes, "brdf: the lobe is D̄/cos²β at θ_d = 0; masking is left out")
@@ -225,24 +367,22 @@ def _restricted(
     return replace(samples.select(keep), notes=notes)
 
 
-def _without_shadow(samples: Measurements, loss: str) -> Measurements:
-    """Return the samples of two directions that are not 0; say so, and how others are taken.
+def _positive(name: str, samples: Measurements, model: BrdfModel) -> Measurements:
+    """Return the samples that are positive; those of a linear loss of one angle as they are.
 
-    No surface scatters exactly nothing: there the detector is in the way of the light.
+    No surface scatters nothing: there a detector is in the way of the light, or sees its own noise.
     """
-    notes = samples.notes
-    if isinstance(samples, DirectionalSamples) and samples.values.any():
-        dark = np.abs(samples.values).max(axis=1) == 0
-        text = "samples are exactly 0, as in the shadow of the detector, and left out"
-        notes += note_of(dark, text)
-        samples = samples.select(~dark)
-    lowest = samples.values.min(axis=1)
-    if loss == "log":
-        text = "samples have a value of 0 or less, which has no logarithm, and are left out"
-        notes += note_of(lowest <= 0, text)
-    else:
+    notes, lowest = samples.notes, samples.values.min(axis=1)
+    if isinstance(samples, Samples) and model.loss != "log":
         notes += note_of(lowest < 0, "samples have a negative value and are fitted as they are")
-    return replace(samples, notes=notes)
+        return replace(samples, notes=notes)
+    if not (lowest > 0).any():
+        raise MdfconvError(
+            f"{name}: no sample is positive in every channel", "no surface scatters 0 or less"
+        )
+    notes += note_of(lowest == 0, "samples are exactly 0 and left out")
+    notes += note_of(lowest < 0, "samples are negative and left out")
+    return replace(samples.select(lowest > 0), notes=notes)
 
 
 def _channels(samples: Measurements) -> list[Measurements]:

@@ -1,164 +1,218 @@
-"""Models that are an offset and a multiple of a lobe: both found for any lobe.
+"""Models that are linear in some of their unknowns: the best coefficients for any lobe.
 
-Linear in the two, the model's best offset and scale are solved for, so that only the lobe's own
-parameters are searched (variable projection: Golub & Pereyra 1973). Under the logarithmic loss
-the same linear step is iterated.
+The model of channel c is fixed + Σ_j a_cj basis_j, a ≥ 0. The coefficients are solved for, so that
+only the lobe's own parameters are searched (variable projection: Golub & Pereyra 1973). Under a
+loss that transforms the values, the same linear step is iterated. Channels come before samples:
+sums run along contiguous memory.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
-from mdfconv.errors import MdfconvError
 
-# Gauss-Newton steps for the logarithms: at the right parameter six are exact under 50 % of noise.
-_LOG_STEPS = 12
-_LOG_TOLERANCE = 1e-11
-# Of the largest sample: what is smaller has no weight 1/value² in double precision.
-_SMALLEST_LOGARITHM = 1e-100
-# Of the smallest sample, under the logarithmic loss: a model is kept positive, far from where a
-# fit ends.
+# Linear steps: at the right parameter six are exact under 50 % of noise.
+_STEPS = 12
+_TOLERANCE = 1e-9
+# Of the smallest value: a model is kept positive, far from where a fit ends.
 _SMALLEST_MODEL = 1e-3
-# Rows of a Jacobian that are held at a time.
-_BLOCK = 65536
+
+
+@dataclass(frozen=True)
+class Transform:
+    """What a loss compares instead of values: `value` of them, and its `slope`."""
+
+    value: Callable[[Array], Array]
+    slope: Callable[[Array], Array]
+
+
+LOGARITHM = Transform(np.log, np.reciprocal)
+
+
+def cube_root(factor: Array) -> Transform:
+    """Return the cube root of values times a factor, shape (n,)."""
+    root = np.cbrt(factor)
+    return Transform(
+        lambda value: root * np.cbrt(value), lambda value: root / (3 * np.square(np.cbrt(value)))
+    )
+
+
+class Terms(NamedTuple):
+    """A model up to its coefficients: the basis, shape (..., k, n), and what is fixed, (..., n)."""
+
+    basis: Array
+    fixed: Array
+
+    def at(self, coefficients: Array) -> Array:
+        """Return the model, shape (..., channels, n), of coefficients (..., channels, k)."""
+        value: Array = coefficients @ self.basis
+        value += self.fixed[..., None, :]
+        return value
 
 
 class Projected(NamedTuple):
-    """What a lobe leaves: residuals, ∂residual/∂model, and the best offsets and scales."""
+    """What terms leave: coefficients, residuals and ∂residual/∂model, (..., channels, n)."""
 
+    coefficients: Array
     residual: Array
     gain: Array
-    offset: Array
-    scale: Array
 
 
 class Projection:
-    """The best offset and scale of each channel, for any lobe.
+    """The best coefficients of each channel, for any terms.
 
-    Values and weights have shape (n, channels), values are positive for logarithms; `floor` keeps
-    offsets from being negative. Raises `MdfconvError` for logarithms of values that are too far
-    apart.
+    Values have shape (channels, n), weights (n,) or (channels, n); the residual is √weight times
+    the difference of values, or of what `transform` makes of them, which takes positive values.
     """
 
-    def __init__(self, values: Array, weight: Array, *, log: bool, floor: bool) -> None:
-        self._values, self._weight, self._log, self._floor = values, weight, log, floor
+    def __init__(self, values: Array, weight: Array, transform: Transform | None) -> None:
+        self._values, self._weight, self._transform = values, weight, transform
         self._root = np.sqrt(weight)
-        if log and values.min() <= _SMALLEST_LOGARITHM * values.max():
-            raise MdfconvError(
-                "the smallest value is less than 1e-100 of the largest: no loss of logarithms "
-                "holds both",
-                "leave out what is no measurement, or take the linear loss",
-            )
+        if transform:
+            self._wanted = transform.value(values)
+            self._smallest = _SMALLEST_MODEL * values.min(axis=-1, keepdims=True)
 
-    def __call__(self, lobe: Array) -> Projected:
-        """Project lobes of shape (..., n): residuals and gain are (..., n, channels)."""
-        values, root = self._values, self._root
-        if not self._log:
-            offset, scale = self._solve(lobe, values, self._weight)
-            return Projected(root * (model(lobe, offset, scale) - values), root, offset, scale)
-        smallest = _SMALLEST_MODEL * values.min(axis=0)
-        offset, scale = self._solve(lobe, values, self._weight / np.square(values))
-        for _ in range(_LOG_STEPS):
-            near = np.maximum(model(lobe, offset, scale), smallest)
-            # One Gauss-Newton step for the logarithms is a weighted linear fit.
-            working = near * (1 + np.log(values / near))
-            last = offset, scale
-            offset, scale = self._solve(lobe, working, self._weight / np.square(near))
-            if np.allclose(last, (offset, scale), rtol=_LOG_TOLERANCE, atol=0):
+    def __call__(
+        self, terms: Terms, start: Array | None = None, *, steps: int = _STEPS
+    ) -> Projected:
+        """Project terms; `start` are coefficients near the best ones, `steps` the most to take.
+
+        Without steps the coefficients are those of the start.
+        """
+        values, transform = self._values, self._transform
+        if transform is None:
+            coefficients = start if start is not None and not steps else None
+            if coefficients is None:
+                coefficients = nonnegative(terms, values, self._weight)
+            residual = terms.at(coefficients)
+            residual -= values
+            residual *= self._root
+            return Projected(coefficients, residual, np.broadcast_to(self._root, values.shape))
+        if start is None:
+            weight = self._weight * np.square(transform.slope(values))
+            start = nonnegative(terms, values, weight)
+        coefficients = start
+        for _ in range(steps):
+            near = np.maximum(terms.at(coefficients), self._smallest)
+            gain = transform.slope(near)
+            # One Gauss-Newton step for the transformed values is a weighted linear fit.
+            working = self._wanted - transform.value(near)
+            working /= gain
+            working += near
+            gain *= gain
+            gain *= self._weight
+            before, coefficients = coefficients, nonnegative(terms, working, gain)
+            change = np.abs(coefficients - before)
+            if not (change > _TOLERANCE * np.abs(coefficients)).any():
                 break
-        near = np.maximum(model(lobe, offset, scale), smallest)
-        return Projected(root * np.log(near / values), root / near, offset, scale)
-
-    def _solve(self, lobe: Array, values: Array, weight: Array) -> tuple[Array, Array]:
-        """Return weighted least-squares offset and scale ≥ 0 of each channel."""
-        offset, scale = _regression(lobe, values, weight)
-        # A lobe points outwards: a negative scale would be a hole.
-        hole = scale < 0
-        if hole.any():
-            mean = (weight * values).sum(axis=-2) / weight.sum(axis=-2)
-            offset, scale = np.where(hole, mean, offset), np.where(hole, 0, scale)
-        if self._floor and (offset < 0).any():
-            alone = _ratio(
-                (weight * lobe[..., None] * values).sum(axis=-2),
-                (weight * np.square(lobe[..., None])).sum(axis=-2),
-            )
-            below = offset < 0
-            scale, offset = np.where(below, np.maximum(alone, 0), scale), np.where(below, 0, offset)
-        return offset, scale
+        near = np.maximum(terms.at(coefficients), self._smallest)
+        residual = transform.value(near)
+        residual -= self._wanted
+        residual *= self._root
+        return Projected(coefficients, residual, self._root * transform.slope(near))
 
 
-def model(lobe: Array, offset: Array, scale: Array) -> Array:
-    """Return offset + scale · lobe, shape (..., n, channels)."""
-    return offset[..., None, :] + lobe[..., None] * scale[..., None, :]
+def nonnegative(terms: Terms, values: Array, weight: Array) -> Array:
+    """Return the weighted least-squares coefficients ≥ 0 of each channel, shape (..., channels, k).
+
+    Of all choices of coefficients that are not zero the best legal one (at most three: eight).
+    """
+    basis = terms.basis
+    weighted = basis[..., None, :, :] * (weight if weight.ndim < 2 else weight[..., :, None, :])
+    normal = weighted @ basis.swapaxes(-1, -2)[..., None, :, :]
+    right = (weighted @ (values - terms.fixed[..., None, :])[..., None])[..., 0]
+    # In units in which the diagonal is 1.
+    size = np.sqrt(np.maximum(normal.diagonal(axis1=-2, axis2=-1), np.finfo(float).tiny))
+    right /= size
+    if right.shape[-1] == 1:
+        return np.asarray(np.maximum(right, 0) / size)
+    normal /= size[..., :, None] * size[..., None, :]
+    with np.errstate(all="ignore"):
+        best = _solved(normal, right)
+    illegal = ~(best >= 0).all(axis=-1)
+    if illegal.any():
+        normal = np.broadcast_to(normal, (*right.shape, right.shape[-1]))
+        best[illegal] = _at_border(normal[illegal], right[illegal])
+    best /= size
+    return best
 
 
-def projected_slope(lobe: Array, slopes: list[Array], gain: Array, scale: Array) -> Array:
+def _at_border(normal: Array, right: Array) -> Array:
+    """Return the best coefficients ≥ 0 of which some are 0, of systems whose diagonal is 1."""
+    count = right.shape[-1]
+    best, explained = np.zeros_like(right), np.zeros(len(right))
+    for number in range(1, count):
+        for chosen in map(list, combinations(range(count), number)):
+            with np.errstate(all="ignore"):
+                solution = _solved(normal[:, chosen][:, :, chosen], right[:, chosen])
+                gain = (solution * right[:, chosen]).sum(axis=-1)
+            is_better = (solution >= 0).all(axis=-1) & (gain > explained)
+            explained = np.where(is_better, gain, explained)
+            candidate = np.zeros_like(right)
+            candidate[:, chosen] = solution
+            best = np.where(is_better[:, None], candidate, best)
+    return best
+
+
+def _solved(normal: Array, right: Array) -> Array:
+    """Return the solutions of small systems whose diagonal is 1."""
+    if right.shape[-1] == 1:
+        return right.copy()
+    if right.shape[-1] == 2:
+        shared = normal[..., 0, 1, None]
+        solution = right - shared * right[..., ::-1]
+        solution /= 1 - shared * shared
+        return np.asarray(solution)
+    # A combination that the data do not tell is left at 0.
+    return np.asarray((np.linalg.pinv(normal, hermitian=True) @ right[..., None])[..., 0])
+
+
+def projected_slope(terms: Terms, slopes: list[Terms], projected: Projected) -> Array:
     """Return ∂residual/∂parameter with the linear part projected out (Kaufman 1975).
 
-    Lobe and slopes have shape (n,), gain (n, channels); the result is (n · channels, parameters).
+    The result has shape (channels · n, parameters). Coefficients that are zero stay so.
     """
     columns = []
-    for slope in slopes:
-        moved = slope[:, None] * scale
-        moved -= model(lobe, *_regression(lobe, moved, np.square(gain)))
-        columns.append((gain * moved).ravel())
+    for moved in moved_models(slopes, projected):
+        for channel, column in enumerate(moved):
+            free = terms.basis[projected.coefficients[channel] > 0] * projected.gain[channel]
+            column *= projected.gain[channel]
+            if len(free):
+                column -= _least_squares(free, column) @ free
+        columns.append(moved.ravel())
     return np.stack(columns, axis=1)
 
 
-def jacobian(lobe: Array, slopes: list[Array], gain: Array, scale: Array) -> Iterator[Array]:
-    """Yield blocks, shape (rows, channels, unknowns), of the slopes of the residuals.
-
-    The unknowns are the lobe's parameters, then offset and scale of each channel.
-    """
-    channel = np.arange(scale.size)
-    offsets = len(slopes) + 2 * channel
-    for start in range(0, lobe.size, _BLOCK):
-        rows = slice(start, start + _BLOCK)
-        part = gain[rows]
-        block = np.zeros((*part.shape, len(slopes) + 2 * scale.size))
-        for column, slope in enumerate(slopes):
-            block[:, :, column] = part * slope[rows, None] * scale
-        block[:, channel, offsets] = part
-        block[:, channel, offsets + 1] = part * lobe[rows, None]
-        yield block
+def moved_models(slopes: list[Terms], projected: Projected) -> list[Array]:
+    """Return ∂model/∂parameter at fixed coefficients, each of shape (channels, n)."""
+    return [slope.at(projected.coefficients) for slope in slopes]
 
 
-def upper_triangle(blocks: Iterable[Array]) -> Array:
-    """Return R of the QR decomposition of a tall matrix, given in blocks of rows."""
-    rows: list[Array] = []
-    for block in blocks:
-        rows = [np.asarray(np.linalg.qr(np.concatenate([*rows, block]), mode="r"))]
-    return rows[0]
+def _least_squares(rows: Array, column: Array) -> Array:
+    """Return the multiples of a few long rows nearest to a column."""
+    size = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    size = np.where(size > 0, size, 1)
+    normal = (rows @ rows.T) / (size[:, None] * size)
+    with np.errstate(all="ignore"):
+        multiples = _solved(normal, (rows @ column) / size) / size
+    return np.nan_to_num(multiples, posinf=0, neginf=0)
 
 
-def standard_deviations(jacobian: Array) -> Array:
-    """Return the square roots of the diagonal of (JᵀJ)⁻¹, without forming JᵀJ; J or its R."""
-    norms = np.linalg.norm(jacobian, axis=0)
-    norms = np.where(norms > 0, norms, 1)
-    _, singular, basis = np.linalg.svd(jacobian / norms, full_matrices=False)
-    singular = np.maximum(singular, np.finfo(float).tiny)
-    deviations: Array = np.linalg.norm(basis / singular[:, None], axis=0) / norms
-    return deviations
-
-
-def _regression(lobe: Array, values: Array, weight: Array) -> tuple[Array, Array]:
-    """Return the offset and the multiple of a lobe nearest to values, for each channel."""
-    total = weight.sum(axis=-2)
-    centre = (weight * lobe[..., None]).sum(axis=-2) / total
-    mean = (weight * values).sum(axis=-2) / total
-    centred = lobe[..., None] - centre[..., None, :]
-    weighted = weight * centred
-    spread = (weighted * centred).sum(axis=-2)
-    shared = (weighted * (values - mean[..., None, :])).sum(axis=-2)
-    scale = _ratio(shared, spread)
-    return mean - scale * centre, scale
-
-
-def _ratio(numerator: Array, denominator: Array) -> Array:
-    """Return numerator/denominator, 0 where the denominator is."""
-    positive = denominator > 0
-    return np.where(positive, numerator / np.where(positive, denominator, 1), 0)
+def information(terms: Terms, slopes: list[Terms], projected: Projected) -> Array:
+    """Return JᵀJ of all unknowns: the lobe's parameters, then the coefficients of each channel."""
+    count, size = len(slopes), terms.basis.shape[-2]
+    channels = len(projected.coefficients)
+    total = np.zeros((count + size * channels,) * 2)
+    moved = moved_models(slopes, projected)
+    for channel, gain in enumerate(projected.gain):
+        rows = np.stack([*(model[channel] for model in moved), *terms.basis]) * gain
+        first = count + size * channel
+        places = np.concatenate([np.arange(count), np.arange(first, first + size)])
+        total[np.ix_(places, places)] += rows @ rows.T
+    return total

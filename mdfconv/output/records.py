@@ -43,6 +43,21 @@ def cell_text(value: Any) -> str:
     return "—" if math.isnan(value) else f"{value:.6g}"
 
 
+def with_error(value: float, error: float | None) -> str:
+    """Return a number to the digits that its standard error supports, with it: 0.1008 ± 0.0032.
+
+    The error has two significant digits; without one, or with 0, the number has four.
+    """
+    if error is None or not 0 < error < math.inf or not math.isfinite(value):
+        return f"{value:.4g}"
+    if error >= abs(value) * 1e6 or error < 1e-12 * abs(value):
+        return f"{value:.4g} ± {error:.2g}"
+    places = 1 - math.floor(math.log10(float(f"{error:.2g}")))
+    if places > 6 or places < -3:
+        return f"{value:.{max(1, places + math.floor(math.log10(abs(value) or error)) + 1)}g} ± {error:.2g}"
+    return f"{round(value, places):.{max(0, places)}f} ± {round(error, places):.{max(0, places)}f}"
+
+
 def rounded_rows(columns: Mapping[str, Any]) -> list[dict[str, float]]:
     """Return arrays of one length as rows, to nine digits: what a curve's file needs."""
     table = zip(*(column.tolist() for column in columns.values()), strict=True)

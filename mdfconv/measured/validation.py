@@ -1,0 +1,149 @@
+"""How far fits can be trusted: fits without an incidence, and of each incidence alone.
+
+Residuals of a fit to a real surface are systematic, so that their number says little about the
+error of an estimate. What does is how far it moves when an angle of incidence is left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mdfconv.distributions.evaluation import Array, Indices
+from mdfconv.errors import MdfconvError
+from mdfconv.measured.brdf_fit import MeasuredFit, Minimum, Problem, fit_distribution
+from mdfconv.measured.model import LOSSLESS, Candidate, lobe_at
+from mdfconv.measured.samples import DirectionalSamples, Measurements
+from mdfconv.measured.scans import incidence_groups, scan_order
+
+# Samples of more are not refitted; folds of more incidences are of several.
+_MOST_SAMPLES = 20_000
+_MOST_FOLDS = 8
+# Of one incidence: folds of blocks that follow each other.
+_BLOCKS, _BLOCK_FOLDS = 25, 5
+_STEPS = 8
+_SEED = 1
+
+
+@dataclass(frozen=True)
+class IncidenceFit:
+    """The lobe of one angle of incidence alone.
+
+    Parameters
+    ----------
+    angle : float
+        The angle of incidence, degrees.
+    count : int
+        How many samples there are.
+    parameter, parameter_error : float
+        The distribution's own parameter and its standard error; NaN if it cannot be fitted.
+    """
+
+    angle: float
+    count: int
+    parameter: float
+    parameter_error: float
+
+
+def validated(samples: Measurements, fit: MeasuredFit) -> MeasuredFit:
+    """Return a fit with its error at samples that were left out, and standard errors from it.
+
+    One angle of incidence at a time is left out, of a single one every fifth block of a scan. The
+    standard errors are those of the jackknife over the angles of incidence (Tukey 1958), or those
+    of the residuals where they are larger.
+    """
+    whole = _problem(samples, fit)
+    folds, are_incidences = _folds(whole.lobe.samples)
+    everything = np.arange(whole.count)
+    outcomes = []
+    for fold in folds:
+        rest = whole.part(np.setdiff1d(everything, fold, assume_unique=True))
+        try:
+            minimum = rest.descend(fit.point, steps=_STEPS)
+        except MdfconvError:
+            continue
+        outcomes.append((minimum, _error_at(whole.part(fold), minimum)))
+    if len(outcomes) < 2:
+        return fit
+    squares = np.square([error for _, error in outcomes])
+    mean = float(np.sqrt(squares.mean()))
+    spread = float(np.std([error for _, error in outcomes], ddof=1) / np.sqrt(len(outcomes)))
+    fit = replace(fit, validated_error=mean, validated_spread=spread)
+    return _jackknifed(fit, [minimum for minimum, _ in outcomes]) if are_incidences else fit
+
+
+def _problem(samples: Measurements, fit: MeasuredFit) -> Problem:
+    """Return the problem of a fit, on some of the samples if there are many."""
+    lobe = lobe_at(samples, fit.what, fit.options, fit.fresnel or LOSSLESS)
+    weights = fit.weights
+    count = len(weights)
+    if count <= _MOST_SAMPLES:
+        return Problem(lobe, weights)
+    index = np.random.default_rng(_SEED).choice(count, _MOST_SAMPLES, replace=False)
+    index.sort()
+    return Problem(lobe.part(index), weights[index])
+
+
+def _incidences(samples: Measurements) -> list[tuple[float, Indices]]:
+    """Return the angles of incidence and the samples at each; none of one angle."""
+    return incidence_groups(samples) if isinstance(samples, DirectionalSamples) else []
+
+
+def _folds(samples: Measurements) -> tuple[list[Indices], bool]:
+    """Return what is left out at a time, and whether it is an angle of incidence."""
+    groups = [group for _, group in _incidences(samples)]
+    if len(groups) > 1:
+        ends = np.linspace(0, len(groups), min(len(groups), _MOST_FOLDS) + 1).astype(int)
+        pairs = zip(ends[:-1], ends[1:], strict=True)
+        return [np.concatenate(groups[first:last]) for first, last in pairs], True
+    order = scan_order(samples)
+    block = np.arange(len(order)) * _BLOCKS // len(order)
+    return [order[block % _BLOCK_FOLDS == fold] for fold in range(_BLOCK_FOLDS)], False
+
+
+def _error_at(problem: Problem, minimum: Minimum) -> float:
+    """Return the error of a fit at samples that it does not know."""
+    return problem.at(minimum.point, minimum.projected.coefficients).error
+
+
+def _jackknifed(fit: MeasuredFit, minima: list[Minimum]) -> MeasuredFit:
+    """Return a fit with standard errors from fits without an incidence each."""
+    estimates = [minimum.ordered().estimates() for minimum in minima]
+    count = len(minima)
+
+    def deviation(values: list[float] | Array) -> Array:
+        return np.sqrt((count - 1) * np.var(np.array(values), axis=0))
+
+    errors = {
+        name: max(error, float(deviation([searched[name] for searched, _ in estimates])))
+        for name, error in fit.errors.items()
+    }
+    linear = {
+        name: tuple(np.maximum(error, deviation([all_[name] for _, all_ in estimates])).tolist())
+        for name, error in fit.linear_errors.items()
+    }
+    return replace(fit, errors=errors, linear_errors=linear)
+
+
+def by_incidence(samples: Measurements, fit: MeasuredFit) -> list[IncidenceFit]:
+    """Return the lobe of each angle of incidence alone.
+
+    γ and Fresnel's factor, which one angle does not tell, are those of the fit; the strength of
+    the lobe and k_d are free.
+    """
+    if fit.what.is_double:
+        what = fit.what
+    else:
+        what = Candidate(fit.distribution)
+    fresnel = LOSSLESS if fit.n is None else f"ior:{fit.n!r}"
+    options = replace(fit.options, fresnel=fresnel, free_specular=True)
+    alone = []
+    for angle, group in _incidences(samples):
+        try:
+            one = fit_distribution(samples.select(group), what, options)
+            numbers = one.parameter, one.parameter_error
+        except MdfconvError:
+            numbers = np.nan, np.nan
+        alone.append(IncidenceFit(angle, len(group), *numbers))
+    return alone

@@ -189,9 +189,11 @@ def test_a_scan_in_the_plane_of_incidence(tmp_path, sign):
 
 def test_two_angles_of_incidence_in_comments_are_not_believed(tmp_path):
     text = "# theta_i = 10\n# theta_i = 20\ntheta_o [deg],brdf\n"
-    samples = read(write(tmp_path, text + rows(np.arange(10.0), np.arange(10.0))))
-    assert isinstance(samples, Samples)
-    assert any("between normal and half vector" in note for note in samples.notes)
+    path = write(tmp_path, text + rows(np.arange(10.0), np.arange(10.0)))
+    with pytest.raises(MdfconvError, match="outgoing direction, and the incident one is missing"):
+        read(path)
+    samples = read(path, ReadOptions(incidence=20))
+    np.testing.assert_allclose(np.degrees(np.arccos(samples.incident[:, 2])), 20)
 
 
 def test_columns_that_the_user_names(tmp_path):
@@ -204,14 +206,14 @@ def test_columns_that_the_user_names(tmp_path):
 
 def test_channels_and_what_is_not_read(tmp_path):
     index = np.arange(1, len(ANGLES) + 1)
-    text = "index,theta_i,phi_i,theta_o,phi_o,R,G,B,stddev\n" + rows(
+    text = "index,theta_i,phi_i,theta_o,phi_o,R,G,B,temperature\n" + rows(
         index, ANGLES, VALUES, 2 * VALUES, 3 * VALUES, VALUES / 100
     )
     samples = read(write(tmp_path, text))
     assert samples.channels == ("R", "G", "B")
     assert_same(samples, INCIDENT, OUTGOING, np.outer(VALUES, [1, 2, 3]))
     assert "column 'index' counts the rows and is passed over" in samples.notes
-    assert any("not read: column 'stddev'" in note for note in samples.notes)
+    assert any("not read: column 'temperature'" in note for note in samples.notes)
 
 
 @pytest.mark.parametrize("shape", [(400, 2), (400,), (399, 1)])

@@ -12,7 +12,7 @@ from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers import READERS, Reader, ReadOptions, Source, read
 from mdfconv.measured.samples import DirectionalSamples
 from tests.measured.scans import grid, measured, merl_bytes, rows, tensor_bytes
-from tests.measured.test_readers import alta, fred, zemax
+from tests.measured.test_readers import alta, fred, klems, zemax
 
 ANGLES = grid((30, 60), range(0, 80, 20), range(0, 360, 90))
 VALUES = measured(ANGLES)[2]
@@ -30,6 +30,7 @@ FILES = {
     "mini-diff": f"NUM_POINTS 32\nVARS theta_i,phi_i,theta_s,Red\n{TABLE}".encode(),
     "zemax": zemax().encode(),
     "fred": fred().encode(),
+    "klems": klems().encode(),
     "alta": alta("ISOTROPIC_TL_TV_PROJ_DPHI", np.radians(ANGLES[:, [0, 2, 3]]), VALUES),
     "alta binary": alta("SPHERICAL_TL_PL_TV_PV", np.radians(ANGLES), VALUES, binary="little"),
     "alta vectors": alta("CARTESIAN", np.ones((9, 6)), np.arange(9.0), "X", binary="big"),

@@ -20,13 +20,13 @@ from mdfconv.registry import unknown_name
 __all__ = ["READERS", "ReadOptions", "Reader", "Source", "list_readers", "read"]
 
 # In the order in which they are asked: text reads what no other one knows.
-_MODULES = ("merl", "rgl", "alta", "zemax", "fred", "astm", "text")
+_MODULES = ("merl", "rgl", "alta", "zemax", "fred", "klems", "astm", "text")
 
 # What other commands read, or what no reader can know the meaning of.
 _NO_MEASUREMENTS = (
     *FOREIGN,
     Foreign("a JSON file", AS_TABLE, r"(?:\xef\xbb\xbf)?\s*(?:\{|\[\s*[\[{\"])"),
-    Foreign("an XML file", AS_TABLE, r"(?:\xef\xbb\xbf)?\s*<\?xml\s"),
+    Foreign("an XML file", AS_TABLE, r"(?:\xef\xbb\xbf)?\s*<\?xml\s(?!.*<WindowElement[\s>])"),
     Foreign("a picture, not measurements", AS_TABLE, r"\x89PNG|\xff\xd8\xff|II\*\0|MM\0\*|v/1\x01"),
 )
 

@@ -110,7 +110,7 @@ class _Columns:
             about=table.about,
             uncertainty=data.uncertainty,
         )
-        return found if is_specular else _oriented(found)
+        return found if is_specular else oriented(found)
 
     def one_angle(self) -> Samples:
         """Return samples against the angle of the half vector."""
@@ -407,7 +407,7 @@ def _is_beside(name: str) -> bool:
     return tables.is_uncertainty(name) or tables.is_wavelength(name)
 
 
-def _oriented(data: DirectionalSamples) -> DirectionalSamples:
+def oriented(data: DirectionalSamples) -> DirectionalSamples:
     """Return samples with the incident directions turned by 180° if the lobe lies there.
 
     Azimuths of incidence are taken to be those towards the light; a note says if the file turned

@@ -49,8 +49,25 @@ _QUANTITY = typer.Option(
     help="ndf (default for text), or brdf at θ_d ≈ 0 (default for MERL, ALTA)."
 )
 _ANGLE_IS = typer.Option(
-    help="Of one angle: that of the half vector (default), or the zenith of the reflected "
-    "or incident direction, the other along the normal."
+    help="Of one angle: that of the half vector (default for a bare angle), the zenith of the "
+    "reflected or incident direction (default for names such as theta_r), or the angle from the "
+    "specular direction, positive towards the horizon."
+)
+_INCIDENCE = option(
+    "DEG",
+    "Angle of incidence of a scan with one angle, that of the detector; by default from a comment "
+    "such as '# theta_i = 45 deg'. With --angle-is incident the angle of the detector.",
+)
+_VALUES_ARE = typer.Option(
+    help="brdf: f_r, 1/sr (default); factor: reflectance factors π f_r, divided by π."
+)
+_UNCERTAINTY = option(
+    "COLUMN",
+    "Column of standard uncertainties, one for all values or repeated for each; by default from "
+    "names such as u_brdf, sigma or std.",
+)
+_WAVELENGTH = option(
+    "NM", "Of a table with a column of wavelengths: the rows of one; default all, a channel each."
 )
 _ANGLE_UNIT = option(
     "UNIT", "degrees, radians or cosine; by default from the header.", words=completion.angle_units
@@ -87,13 +104,19 @@ def command(
     targets: Annotated[list[str] | None, _TARGETS] = None,
     quantity: Annotated[Literal["ndf", "brdf"] | None, _QUANTITY] = None,
     angle: Annotated[str | None, _column("angles", "; by default from the names")] = None,
-    angle_is: Annotated[Literal["half", "reflected", "incident"] | None, _ANGLE_IS] = None,
+    angle_is: Annotated[
+        Literal["half", "reflected", "incident", "specular"] | None, _ANGLE_IS
+    ] = None,
+    incidence: Annotated[float | None, _INCIDENCE] = None,
     theta_i: Annotated[str | None, _column("the incident zenith")] = None,
     phi_i: Annotated[str | None, _column("the incident azimuth")] = None,
     theta_o: Annotated[str | None, _column("the outgoing zenith")] = None,
     phi_o: Annotated[str | None, _column("the outgoing azimuth")] = None,
     angle_unit: Annotated[str | None, _ANGLE_UNIT] = None,
     values: Annotated[list[str] | None, option("COLUMN", "Column of values; repeatable.")] = None,
+    values_are: Annotated[Literal["brdf", "factor"] | None, _VALUES_ARE] = None,
+    uncertainty: Annotated[list[str] | None, _UNCERTAINTY] = None,
+    wavelength: Annotated[float | None, _WAVELENGTH] = None,
     cells: Annotated[int | None, _CELLS] = None,
     max_angle: Annotated[float | None, _MAX_ANGLE] = None,
     separate: Annotated[bool, _SEPARATE] = False,
@@ -164,7 +187,19 @@ def command(
         "separate": separate,
     }
     columns = ReadOptions(
-        angle, theta_i, phi_i, theta_o, phi_o, tuple(values or ()), angle_unit, angle_is, cells
+        angle=angle,
+        theta_i=theta_i,
+        phi_i=phi_i,
+        theta_o=theta_o,
+        phi_o=phi_o,
+        values=tuple(values or ()),
+        uncertainty=tuple(uncertainty or ()),
+        unit=angle_unit,
+        angle_is=angle_is,
+        incidence=incidence,
+        wavelength=wavelength,
+        values_are=values_are,
+        cells=cells,
     )
     directional = {
         "masking": masking, "fresnel": fresnel, "free-specular": free_specular,

@@ -70,7 +70,6 @@ FOREIGN = (
     Foreign("a MATLAB file", AS_TABLE, r"MATLAB [57]\.\d MAT-file"),
     Foreign("an HDF5 file", AS_TABLE, r"\x89HDF\r\n\x1a\n"),
     Foreign("a Parquet file", AS_TABLE, "PAR1"),
-    Foreign("a WINDOW BSDF (XML)", AS_TABLE, r"(?:<[?!][^>]*>\s*)*<WindowElement[\s>]"),
     Foreign("a surface file of Speos (OPTIS)", AS_TABLE, _TEXT + "OPTIS - "),
     Foreign("a PDF document", AS_TABLE, "%PDF-"),
     Foreign("a USDZ archive", _SCENE, _ZIP + r"[^/]{1,80}?\.usd"),

@@ -12,20 +12,25 @@ from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers import READERS, Reader, ReadOptions, Source, read
 from mdfconv.measured.samples import DirectionalSamples
 from tests.measured.scans import grid, measured, merl_bytes, rows, tensor_bytes
-from tests.measured.test_readers import alta, fred, zemax
+from tests.measured.test_readers import alta, fred, klems, zemax
 
 ANGLES = grid((30, 60), range(0, 80, 20), range(0, 360, 90))
 VALUES = measured(ANGLES)[2]
 TABLE = rows(ANGLES, VALUES, digits=".4g")
+NINE = rows(range(9), range(9), range(9))
+SPECTRA = rows([400, 500] * 6, np.arange(12) // 2 * 9, range(12), range(12))
 FILES = {
     "table": f"theta_i,phi_i,theta_o,phi_o,brdf\n{TABLE}".encode(),
     "comment": f"# phi_i theta_i phi_o theta_o brdf\n{TABLE}".replace(",", " ").encode(),
     "utf-16": f"θi;φi;θo;φo;f_r\n{TABLE}".replace(",", ";").replace(".", ",").encode("utf-16"),
     "one angle": b"# theta_i = 30 deg\nn,theta,R\n" + rows(range(9), range(9), range(9)).encode(),
+    "one incidence": f"# theta_i = 30 deg\ntheta_r,R,u\n{NINE}".encode(),
+    "wavelengths": f"wl,offset,R,u [%]\n{SPECTRA}".encode(),
     "astm": f"NUM_POINTS 32\nVARS theta_i,phi_i,theta_s,phi_s,Red\n{TABLE}".encode(),
     "mini-diff": f"NUM_POINTS 32\nVARS theta_i,phi_i,theta_s,Red\n{TABLE}".encode(),
     "zemax": zemax().encode(),
     "fred": fred().encode(),
+    "klems": klems().encode(),
     "alta": alta("ISOTROPIC_TL_TV_PROJ_DPHI", np.radians(ANGLES[:, [0, 2, 3]]), VALUES),
     "alta binary": alta("SPHERICAL_TL_PL_TV_PV", np.radians(ANGLES), VALUES, binary="little"),
     "alta vectors": alta("CARTESIAN", np.ones((9, 6)), np.arange(9.0), "X", binary="big"),
@@ -62,6 +67,10 @@ def check_result(reading):
         return
     assert np.isfinite(samples.values).all()
     assert samples.values.shape[1] == len(samples.channels)
+    if samples.uncertainty is not None:
+        assert samples.uncertainty.shape == samples.values.shape
+        assert ((samples.uncertainty > 0) & np.isfinite(samples.uncertainty)).all()
+    assert all(len(line) <= 120 and line.isprintable() for line in samples.about)
     if isinstance(samples, DirectionalSamples):
         for vectors in (samples.incident, samples.outgoing):
             np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1, atol=1e-9)
@@ -93,15 +102,19 @@ def test_arbitrary_tables(tmp_path, text):
     check(path)
     check(path, ReadOptions(theta_i="1", theta_o="2", values=("3",)))
     check(path, ReadOptions(angle="1", unit="cosine", angle_is="reflected"))
+    check(path, ReadOptions(incidence=30, uncertainty=("2",), values_are="factor"))
+    check(path, ReadOptions(angle_is="specular", incidence=30, unit="degrees", wavelength=1))
 
 
 @pytest.mark.parametrize("form", FILES)
 def test_whole_files_are_read(tmp_path, form):
     path = tmp_path / "a.txt"
     path.write_bytes(FILES[form])
-    if form != "one angle":
+    if form not in ("one angle", "wavelengths"):
         assert len(read(path).values) > 1 or form == "merl"
     check(path)
+    if form == "wavelengths":
+        assert read(path, ReadOptions(incidence=30)).channels == ("400 nm", "500 nm")
 
 
 @pytest.mark.parametrize("form", FILES)
@@ -116,7 +129,7 @@ def test_damaged(tmp_path, form, data):
     path.write_bytes(
         content[:place] if damage is None else content[:place] + damage + content[end:]
     )
-    check(path)
+    check(path, ReadOptions(incidence=30) if form == "wavelengths" else None)
 
 
 @SETTINGS

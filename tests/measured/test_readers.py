@@ -189,9 +189,11 @@ def test_a_scan_in_the_plane_of_incidence(tmp_path, sign):
 
 def test_two_angles_of_incidence_in_comments_are_not_believed(tmp_path):
     text = "# theta_i = 10\n# theta_i = 20\ntheta_o [deg],brdf\n"
-    samples = read(write(tmp_path, text + rows(np.arange(10.0), np.arange(10.0))))
-    assert isinstance(samples, Samples)
-    assert any("between normal and half vector" in note for note in samples.notes)
+    path = write(tmp_path, text + rows(np.arange(10.0), np.arange(10.0)))
+    with pytest.raises(MdfconvError, match="outgoing direction, and the incident one is missing"):
+        read(path)
+    samples = read(path, ReadOptions(incidence=20))
+    np.testing.assert_allclose(np.degrees(np.arccos(samples.incident[:, 2])), 20)
 
 
 def test_columns_that_the_user_names(tmp_path):
@@ -204,14 +206,14 @@ def test_columns_that_the_user_names(tmp_path):
 
 def test_channels_and_what_is_not_read(tmp_path):
     index = np.arange(1, len(ANGLES) + 1)
-    text = "index,theta_i,phi_i,theta_o,phi_o,R,G,B,stddev\n" + rows(
+    text = "index,theta_i,phi_i,theta_o,phi_o,R,G,B,temperature\n" + rows(
         index, ANGLES, VALUES, 2 * VALUES, 3 * VALUES, VALUES / 100
     )
     samples = read(write(tmp_path, text))
     assert samples.channels == ("R", "G", "B")
     assert_same(samples, INCIDENT, OUTGOING, np.outer(VALUES, [1, 2, 3]))
     assert "column 'index' counts the rows and is passed over" in samples.notes
-    assert any("not read: column 'stddev'" in note for note in samples.notes)
+    assert any("not read: column 'temperature'" in note for note in samples.notes)
 
 
 @pytest.mark.parametrize("shape", [(400, 2), (400,), (399, 1)])
@@ -355,6 +357,78 @@ def test_freds_settings(tmp_path):
     text = fred("angles=rad bsdf=value scale=0.5", 0.5, np.pi / 180)
     plain = read(write(tmp_path, fred(), "plain.txt"))
     assert_same(read(write(tmp_path, text)), plain.incident, plain.outgoing, plain.values)
+
+
+# Klems
+
+
+RINGS = [(0, 1), (20, 4), (50, 8)]
+
+
+def klems(blocks=(("Transmission Front", 3), ("Reflection Front", 1)), wavelength="Visible"):
+    """A BSDF of WINDOW, the values of each block so many times those of GGX; φ_i as of travel."""
+    patches = np.array([(theta, 360 * k / count) for theta, count in RINGS for k in range(count)])
+    theta, phi = np.radians(patches).T
+    incident, outgoing = vector(theta, phi + np.pi), vector(theta, phi)
+    matrix = ggx(incident[None, :], outgoing[:, None])
+    rings = "".join(
+        f"<AngleBasisBlock><Theta>{theta}</Theta><nPhis>{count}</nPhis></AngleBasisBlock>"
+        for theta, count in RINGS
+    )
+    data = "".join(
+        f"""<WavelengthData><Wavelength unit="Integral">{wavelength}</Wavelength>
+        <WavelengthDataBlock><WavelengthDataDirection>{name}</WavelengthDataDirection>
+        <ColumnAngleBasis>rings</ColumnAngleBasis><RowAngleBasis>rings</RowAngleBasis>
+        <ScatteringData>{rows(factor * matrix, separator=", ")}</ScatteringData>
+        </WavelengthDataBlock></WavelengthData>""".replace("\n", ",\n").replace(">,", ">")
+        for name, factor in blocks
+    )
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+    <!-- by hand --><WindowElement xmlns="http://windows.lbl.gov"><Optical><Layer>
+    <Material><Name>Shade</Name></Material><DataDefinition>
+    <IncidentDataStructure>Columns</IncidentDataStructure><AngleBasis>
+    <AngleBasisName>rings</AngleBasisName>{rings}</AngleBasis></DataDefinition>
+    {data}</Layer></Optical></WindowElement>"""
+
+
+def test_klems(tmp_path):
+    samples = read(write(tmp_path, klems(), "a.xml"))
+    np.testing.assert_allclose(samples.values[:, 0], ggx(samples.incident, samples.outgoing))
+    assert samples.values.shape == (13 * 13, 1)
+    assert samples.about == ("Name: Shade",)
+    assert "Reflection Front, Visible is read, at the centres of the patches" in samples.notes
+    zeniths = np.degrees(np.arccos(samples.incident[:, 2]))
+    np.testing.assert_allclose(np.unique(np.round(zeniths, 6)), [0, 20, 50])
+    # What is wrong with a block that is not read does not matter.
+    other = klems().replace("ScatteringData>", "ScatteringData>x ", 1)
+    assert len(read(write(tmp_path, other)).values) == 169
+    back = read(write(tmp_path, klems([("Reflection Back", 2)], "0.55")))
+    np.testing.assert_allclose(back.values, 2 * samples.values)
+    assert any("Reflection Back, 0.55 is read" in note for note in back.notes)
+
+
+ENTITY = '?>\n<!DOCTYPE a [<!ENTITY b "c">]>'
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (klems([("Transmission Front", 1)]), "no block of reflection; it has Transmission Front"),
+        (klems([]), "no block of reflection; it has nothing"),
+        (klems().replace("Columns", "TensorTree4"), "'TensorTree4'; only Columns"),
+        (klems().replace("<Theta>20", "<Theta>-20"), "a ring of 4 patches at -20°"),
+        (klems().replace("<nPhis>8", "<nPhis>7"), "169 numbers of .* 12 × 12 patches"),
+        (klems().replace("<nPhis>8", "<nPhis>x"), "as Klems: ValueError"),
+        (klems().replace("<nPhis>8", "<nPhis>99999999999"), "a ring of 99999999999"),
+        (klems().replace("Name>rings", "Name>other"), "no basis of angles 'rings'"),
+        (klems()[:-30], "not well-formed XML: "),
+        (klems().replace("?>", ENTITY, 1), "with a document type"),
+    ],
+)
+def test_klems_that_is_not_read(tmp_path, content, words):
+    with pytest.raises(MdfconvError, match=words) as caught:
+        read(write(tmp_path, content))
+    assert "\n" not in str(caught.value)
 
 
 # ALTA

@@ -79,10 +79,6 @@ SAMPLES = {
     "a MATLAB file": [b"MATLAB 5.0 MAT-file, Platform: GLNXA64".ljust(128) + bytes(40)],
     "an HDF5 file": [b"\x89HDF\r\n\x1a\n\0\0\0\0"],
     "a Parquet file": [b"PAR1\x15\x04"],
-    "a WINDOW BSDF (XML)": [
-        b'<?xml version="1.0" encoding="UTF-8"?>\n<!-- File produced by: x -->\n'
-        b'<WindowElement xmlns="http://windows.lbl.gov">\n'
-    ],
     "a surface file of Speos (OPTIS)": [
         b"OPTIS - brdf surface file v9.0\n0\nScattering surface\n",
         b"\xef\xbb\xbfOPTIS - Anisotropic BSDF surface file v8.0\r\n",

@@ -349,7 +349,7 @@ POINTER = b"version https://git-lfs.github.com/spec/v1\noid sha256:" + b"0" * 64
         ("a.xlsx", xlsx(), "an Excel workbook", "CSV"),
         ("a.csv", xlsx(), "an Excel workbook", "CSV"),
         ("a.npy", npy(), "a NumPy array", "CSV"),
-        ("a.xml", b'<?xml version="1.0"?>\n<WindowElement >', "a WINDOW BSDF (XML)", "CSV"),
+        ("a.brdf", b"OPTIS - brdf surface file v9.0\n0\n", "a surface file of Speos", "CSV"),
         ("a.fbx", b"Kaydara FBX Binary  \0\x1a\0", "an FBX file", "glTF"),
     ],
 )

@@ -7,7 +7,7 @@ light; both point away from the surface.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from mdfconv.distributions.evaluation import Array
 from mdfconv.measured.readers import base
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source
 from mdfconv.measured.readers.tables import parse_table
-from mdfconv.measured.samples import Measurements, samples
+from mdfconv.measured.samples import Measurements, about_of, samples
 
 _TAG = re.compile(r"^#[ \t]*([A-Z_]+)[ \t]+([^\n]*?)\s*$", re.M)
 _DIMENSIONS = re.compile(r"^#\s*DIM\s+\S", re.M)
@@ -49,7 +49,9 @@ _TWO_DIRECTIONS: dict[str, tuple[int, Callable[..., tuple[Array, Array]]]] = {
 def _read(source: Source, options: ReadOptions) -> Measurements:
     path = source.path
     options.refuse(path, "ALTA's header names its columns")
-    tags = dict(_TAG.findall("\n".join(base.decode_head(source.head).splitlines())))
+    head = base.decode_head(source.head).splitlines()
+    tags = dict(_TAG.findall("\n".join(head)))
+    about = about_of(_comments(head))
     parametrization = tags.get("PARAM_IN", "").upper()
     inputs, outputs = _dimensions(source, tags.get("DIM", ""), parametrization)
     numbers = _numbers(source, tags, inputs, outputs)
@@ -61,7 +63,7 @@ def _read(source: Source, options: ReadOptions) -> Measurements:
         notes = (f"{kind} is read as values of f_r",)
     if parametrization in _ONE_ANGLE:
         unit = _ONE_ANGLE[parametrization]
-        return samples(path, x[:, 0], unit, values, names, "brdf", notes)
+        return samples(path, x[:, 0], unit, values, names, "brdf", notes, about)
     whole = np.isfinite(numbers).all(axis=1, keepdims=True)
     x, values = np.where(whole, x, 0.0), np.where(whole, values, np.nan)
     with np.errstate(all="ignore"):
@@ -69,7 +71,16 @@ def _read(source: Source, options: ReadOptions) -> Measurements:
         if kind == _WEIGHTED:
             values = values / np.where(view[:, 2:] > 0, view[:, 2:], np.nan)
             notes += ("the values hold the cosine of the view, by which they are divided",)
-        return base.samples_of_vectors(path, light, view, values, names, notes)
+        return base.samples_of_vectors(path, light, view, values, names, notes, about)
+
+
+def _comments(head: Sequence[str]) -> Iterator[str]:
+    """Yield the comments above the numbers that are none of ALTA's."""
+    for line in head:
+        if not line.startswith("#") or line.startswith(_BEGIN.decode()):
+            return
+        if not _TAG.match(line):
+            yield line.strip("# \t")
 
 
 def _dimensions(source: Source, text: str, parametrization: str) -> tuple[int, int]:

@@ -34,7 +34,10 @@ def _read(source: Source, options: ReadOptions) -> Measurements:
     count, counted = len(table.numbers), _COUNT.search("\n".join(lines[:at]))
     if counted and counted["count"] != str(count):
         raise table.error(f"{count} rows where NUM_POINTS says {counted['count'][:20]}")
-    return read_table(replace(table, notes=(*table.notes, *notes)), options)
+    facts = [line for line in lines[:at] if not _COUNT.match(line)]
+    # The rows may have comments of their own.
+    comments = [*facts, *table.comments]
+    return read_table(replace(table, notes=(*table.notes, *notes), comments=comments), options)
 
 
 def _completed(names: str, row: str) -> tuple[str, tuple[str, ...]]:

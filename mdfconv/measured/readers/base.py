@@ -44,11 +44,24 @@ class ReadOptions:
         find them by their names.
     values : tuple of str
         The columns of values; empty for all that are none of angles.
+    uncertainty : tuple of str
+        The columns of the standard uncertainties of the values, one for all channels or one for
+        each; empty to find them by their names.
     unit : str or None
         ``"degrees"``, ``"radians"`` or ``"cosine"``; None to find it.
     angle_is : str or None
-        Of a table of one angle: ``"half"``, the angle between normal and half vector, which is
-        what None takes it for; ``"reflected"`` or ``"incident"``, the zenith of that direction.
+        Of a table of one angle: ``"half"``, the angle between normal and half vector;
+        ``"reflected"`` or ``"incident"``, the zenith of that direction; ``"specular"``, the angle
+        from the mirror direction in the plane of incidence, positive towards the horizon. None
+        for what its name says, and half for the name of no direction.
+    incidence : float or None
+        Of a table with one direction: the zenith of the other one, degrees, [0, 90); None for
+        what the comments say. With ``angle_is="incident"`` it is that of the outgoing direction.
+    wavelength : float or None
+        Of a table with a column of wavelengths: the one whose rows are read, nm; None for all,
+        a channel each.
+    values_are : str or None
+        ``"brdf"``, which is what None takes them for, or ``"factor"``: reflectance factors π f_r.
     cells : int or None
         Of a MERL file: how many cells of the whole are taken; None for the slice θ_d ≈ 0.
     """
@@ -59,21 +72,26 @@ class ReadOptions:
     theta_o: str | None = None
     phi_o: str | None = None
     values: tuple[str, ...] = ()
+    uncertainty: tuple[str, ...] = ()
     unit: str | None = None
     angle_is: str | None = None
+    incidence: float | None = None
+    wavelength: float | None = None
+    values_are: str | None = None
     cells: int | None = None
 
     @property
     def by_number(self) -> bool:
         """Whether columns are chosen, all of them by their numbers."""
         directions = self.theta_i, self.phi_i, self.theta_o, self.phi_o
-        chosen = [name for name in (self.angle, *directions, *self.values) if name is not None]
+        columns = self.angle, *directions, *self.values, *self.uncertainty
+        chosen = [name for name in columns if name is not None]
         return bool(chosen) and all(name.isdecimal() for name in chosen)
 
     def refuse(self, path: Path, reason: str) -> None:
         """Raise if anything is chosen for a file that leaves no choice."""
-        if replace(self, cells=None) != ReadOptions():
-            raise MdfconvError(f"{path}: {reason}", "choose no columns and no unit")
+        if replace(self, cells=None, values_are=None) != ReadOptions():
+            raise MdfconvError(f"{path}: {reason}", "choose no columns and no unit or angle")
 
 
 @dataclass(frozen=True)
@@ -172,11 +190,12 @@ def samples_of_vectors(
     values: Array,
     channels: tuple[str, ...],
     notes: tuple[str, ...],
+    about: tuple[str, ...] = (),
 ) -> DirectionalSamples:
     """Return samples of directions that are vectors, shape (n, 3), as `directional_samples`."""
     light = polar_angle(incident), azimuth(incident)
     view = polar_angle(outgoing), azimuth(outgoing)
-    return directional_samples(path, *light, *view, values, channels, notes)
+    return directional_samples(path, *light, *view, values, channels, notes, about)
 
 
 def turn_from_normal(vectors: Array, theta: Array, phi: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, known_by
 from mdfconv.measured.readers.tables import number
-from mdfconv.measured.samples import DirectionalSamples, directional_samples
+from mdfconv.measured.samples import DirectionalSamples, about_of, directional_samples
 
 _KNOWN_BY = re.compile(r"^\s*type\s+bsdf_data\b", re.M | re.I)
 _SETTING = re.compile(r"(\w+)\s*=\s*(\S+)")
@@ -23,7 +23,8 @@ def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
     scale, to_radians = 1.0, np.pi / 180
     incidence: list[float] = []
     rows: list[list[float]] = []
-    for place, line in enumerate(source.lines(), start=1):
+    lines = source.lines()
+    for place, line in enumerate(lines, start=1):
         words = line.split()
         if not words or line.lstrip().startswith(_COMMENTS) or words[0].lower() == "type":
             continue
@@ -45,9 +46,9 @@ def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
     theta_i, phi_i, theta_o, phi_o = table[:, :4].T * to_radians
     with np.errstate(over="ignore"):
         values = table[:, 4:] * scale
-    return directional_samples(
-        source.path, theta_i, phi_i + np.pi, theta_o, phi_o, values, ("value",)
-    )
+    about = about_of(line.strip(" \t!#/") for line in lines if line.lstrip().startswith(_COMMENTS))
+    angles = theta_i, phi_i + np.pi, theta_o, phi_o
+    return directional_samples(source.path, *angles, values, ("value",), (), about)
 
 
 def _format(source: Source, place: int, line: str) -> tuple[float, float]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from mdfconv.distributions.evaluation import Array
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source
-from mdfconv.measured.samples import Samples, samples
+from mdfconv.measured.samples import Samples, about_of, samples
 
 _SIGNATURE = b"tensor_file\0"
 _VERSION = (1, 0)
@@ -25,6 +25,9 @@ _MOST_DIMENSIONS = 8
 
 def _read(source: Source, options: ReadOptions) -> Samples:
     options.refuse(source.path, "a tensor file has no columns")
+    if options.values_are is not None:
+        reason = "its values are a distribution of normals, not reflectance"
+        raise source.error(reason, "do not say what they are")
     wanted = _fields(source)
     density = wanted.get("ndf")
     if density is None or density.ndim != 2 or min(density.shape) < 1 or density.shape[1] < 2:
@@ -36,7 +39,11 @@ def _read(source: Source, options: ReadOptions) -> Samples:
     azimuths = wanted.get("phi_i")
     if azimuths is not None and azimuths.size > 2:
         notes.append("the surface is anisotropic: averaged over azimuth")
-    return samples(source.path, theta, "radians", values[:, None], ("ndf",), "ndf", tuple(notes))
+    description = wanted.get("description", np.zeros(0))
+    is_text = description.dtype == np.uint8
+    about = about_of(description.tobytes().decode(errors="replace").splitlines() if is_text else ())
+    what = values[:, None], ("ndf",), "ndf", tuple(notes), about
+    return samples(source.path, theta, "radians", *what)
 
 
 def _around(density: Array) -> Array:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
+from mdfconv.measured.samples import about_of, wavelengths_of
 
 
 class Role(StrEnum):
@@ -25,6 +26,7 @@ class Role(StrEnum):
     theta_o = "zenith of the outgoing direction"
     phi_o = "azimuth of the outgoing direction"
     phi = "difference of the azimuths"
+    specular = "angle from the mirror direction"
     angle = "angle"
 
 
@@ -34,36 +36,48 @@ _WORDS = {
     "azimuth": "phi azimuth azimuthal azi az ph",
     "angle": "angle beta alpha",
     "incident": "i in inc incident incidence incoming ingoing input light l source src "
-    "illumination aoi",
+    "illumination lamp laser aoi",
     "outgoing": "o out outgoing output r refl reflected reflection s scat scatter scattered "
     "scattering v view viewing viewer detector det observer observation e exit emergent emission "
-    "exitant measure measured measurement",
+    "exitant measure measured measurement receiver sensor camera",
     "difference": "delta relative rel diff difference",
     "half": "h half halfway",
     "unit": "deg degree degrees rad radian radians cos cosine",
     "filler": "of the direction dir vector normal w omega",
+    "mirror": "specular spec mirror aspecular offset",
+    "uncertainty": "u unc uncert uncertainty uncertainties sigma σ std stdev stddev sd err error "
+    "sem",
+    # What may stand beside the word of an uncertainty, or be all that is called a value.
+    "any value": "brdf bsdf f fr value values val standard deviation dev of the rel relative "
+    "percent",
     # The others are names as a whole.
     "value": "brdf bsdf f fr value values val r g b red green blue x y z luminance ndf d "
     "reflectance",
-    "wavelength": "wavelength lambda λ wavelengthnm",
+    "wavelength": "wavelength lambda λ wl wavelengthnm lambdanm λnm wlnm wavelengthum lambdaum "
+    "wavelengthµm wavelengthμm λum λµm λμm",
     "index": "index idx no nr n id row sample point num number i",
 }
 _VOCABULARY = {kind: frozenset(words.split()) for kind, words in _WORDS.items()}
 _ANGULAR = ("zenith", "azimuth", "angle")
 _SPELLED = {"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "Δ": " delta ", "δ": " delta "}
 _JOINED = re.compile(r"(delta|d)?(theta|phi|zenith|azimuth)(\w*)")
-_CHANNEL = re.compile(r"(lambda|wl|brdf|bsdf|r)?\s*_?\d{3,4}(\.\d+)?\s*(nm)?", re.I)
+# The difference of two angles, as in theta_s - theta_i.
+_MINUS = re.compile(r"(.*?\w)\s*[-−–]\s*(\w.*)")
 
 
 @cache
 def role_of(name: str) -> Role | None:
     """Return what kind of angle a name speaks of; None if of none, or of another coordinate."""
     words = _words(name)
+    if is_uncertainty(name):
+        return None
+    if sign_from_mirror(name):
+        return Role.specular
     sides = words - _vocabulary(*_ANGULAR, "unit")
     is_whole = not sides - _vocabulary("filler")
     incident, outgoing = (bool(sides & _VOCABULARY[side]) for side in ("incident", "outgoing"))
     if words & _VOCABULARY["azimuth"]:
-        if is_whole or sides & _VOCABULARY["difference"]:
+        if is_whole or sides & _VOCABULARY["difference"] or (incident and outgoing):
             return Role.phi
         one_side = (Role.phi_i, Role.phi_o)
     elif words & _vocabulary("zenith", "angle") or "aoi" in words:
@@ -73,6 +87,22 @@ def role_of(name: str) -> Role | None:
     else:
         return Role.angle if words and words <= _VOCABULARY["unit"] else None
     return one_side[outgoing] if incident != outgoing else None
+
+
+@cache
+def sign_from_mirror(name: str) -> int:
+    """Return 1 for an angle from the mirror direction, −1 for one towards the normal, else 0."""
+    difference = _MINUS.fullmatch(_bare(name).strip())
+    if difference:
+        pair = tuple(role_of(part) for part in difference.groups())
+        both = Role.theta_o, Role.theta_i
+        return 1 if pair == both else -1 if pair == both[::-1] else 0
+    words = _words(name)
+    known = _vocabulary("zenith", "angle", "unit", "filler", "mirror", "outgoing", "difference")
+    is_angular = words & {*_vocabulary("zenith", "angle", "unit"), "offset", "aspecular"}
+    if not (words & _VOCABULARY["mirror"] and is_angular and words <= {*known, "from", "to"}):
+        return 0
+    return -1 if "aspecular" in words else 1
 
 
 def is_half(name: str) -> bool:
@@ -85,11 +115,34 @@ def is_angle(name: str) -> bool:
     return bool(_words(name) & _vocabulary(*_ANGULAR)) or role_of(name) is not None
 
 
+@cache
 def is_value(name: str) -> bool:
     """Return whether a name is one of values: of a BRDF, a channel or a wavelength."""
     bare = _bare(name)
     is_known = re.sub(r"[^a-z0-9]", "", bare) in _VOCABULARY["value"]
-    return is_known or bool(_CHANNEL.fullmatch(bare.strip()))
+    return is_known or wavelengths_of([bare]) is not None
+
+
+@cache
+def is_uncertainty(name: str) -> bool:
+    """Return whether a name is one of uncertainties."""
+    words = _uncertain_words(name)
+    # In the middle a letter may mean anything.
+    found = {word for word in words if len(word) > 2} | {*words[:1], *words[-1:]}
+    return bool(found & _VOCABULARY["uncertainty"]) or "standard deviation" in " ".join(words)
+
+
+def uncertain_channel(name: str) -> str:
+    """Return of which channel a column of uncertainties is; "" for any: r of u_R, 465 of u(465)."""
+    common = _vocabulary("uncertainty", "any value")
+    rest = [word for word in _uncertain_words(name) if word not in common]
+    return "".join(rest).removesuffix("nm")
+
+
+def _uncertain_words(name: str) -> list[str]:
+    bare = re.sub(r"\bk\s*=\s*[\d.]+|\d/sr|sr\^?-?1", " ", name.lower())
+    bare = re.sub(r"(?<![a-z])f_r(?![a-z])", "fr", bare)
+    return re.findall(r"[a-zσ]+|\d+(?:\.\d+)?", bare)
 
 
 def is_wavelength(name: str) -> bool:
@@ -143,6 +196,12 @@ _DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
 _MSVC = re.compile(r"([-+]?)1\.#(INF|IND|QNAN|SNAN)0*", re.I)
 # Lines by which the form of a table is decided.
 _LOOKED_AT = 50
+_CHARACTERS_LOOKED_AT = 50_000
+# Lines that are read at once, and what stands in those that a fast parser reads as this one does.
+_BLOCK = 4096
+_PLAIN = b"0123456789+-.eE \tnaifNAIF\n"
+# Of a list of columns a message has so many.
+_MOST_NAMED = 12
 # What a cell of a second line of headers holds.
 _UNIT = re.compile(
     r"\W*|\W*(deg(ree)?s?|°|rad(ian)?s?|(1/)?sr(\^?-?1)?|nm|none|a\.?u\.?|w/.*)\W*", re.I
@@ -188,6 +247,25 @@ class TableForm:
         except ValueError:
             return None
 
+    def plain_numbers(self, lines: Sequence[str]) -> Array | None:
+        """Return the numbers of lines that hold nothing else; None if they have to be looked at.
+
+        The same numbers as `numbers` of each line, by a parser that knows no empty cells.
+        """
+        if self.separator == "\t":
+            # At the ends it separates no cells.
+            lines = [line.strip() for line in lines]
+        text = "\n".join(lines)
+        if self.decimal_comma:
+            text = text.replace(",", ".")
+            lines = text.split("\n")
+        marks = _PLAIN + (self.separator or "").encode()
+        if not text.isascii() or text.encode().translate(None, marks) or not text.strip():
+            return None
+        with suppress(ValueError):
+            return np.loadtxt(lines, delimiter=self.separator, comments=None, ndmin=2)
+        return None
+
     def names(self, line: str, width: int) -> list[str]:
         """Return the cells of a line of words, which may be set apart otherwise than numbers."""
         cells = self.cells(line)
@@ -220,6 +298,8 @@ class Table:
     is_named: bool
     comments: list[str] = field(default_factory=list)
     notes: tuple[str, ...] = ()
+    # The comment from which the names are.
+    named_by: str = ""
 
     def column(self, name: str) -> int:
         """Return the index of a column that the user names, or numbers from 1."""
@@ -228,16 +308,42 @@ class Table:
             return lowered.index(name.lower())
         if name.isdecimal() and 1 <= int(name) <= len(self.names):
             return int(name) - 1
-        raise self.error(f"no column '{name}'", f"there are {', '.join(self.names)}")
+        raise self.error(f"no column '{name}'", f"there are {self.known}")
+
+    @cached_property
+    def named(self) -> dict[int, str]:
+        """The names of the columns by their indices; empty if the file gives none."""
+        return dict(enumerate(self.names)) if self.is_named else {}
+
+    @cached_property
+    def counting(self) -> set[int]:
+        """The columns that are called an index and count the rows."""
+        columns = ((index, name, self.numbers[:, index]) for index, name in self.named.items())
+        return {index for index, name, numbers in columns if counts_rows(name, numbers)}
+
+    @property
+    def about(self) -> tuple[str, ...]:
+        """What the comments say of the file."""
+        return about_of(comment for comment in self.comments if comment != self.named_by)
+
+    @property
+    def known(self) -> str:
+        """The names of the columns as a message lists them."""
+        return _listed(self.names)
 
     def listed(self, columns: Sequence[int]) -> str:
         """Return columns as a message names them."""
-        names = ", ".join(f"'{self.names[index]}'" for index in columns)
+        names = _listed([f"'{self.names[index]}'" for index in columns])
         return f"column{'s' if len(columns) > 1 else ''} {names}"
 
     def error(self, reason: str, hint: str = "", *, argument: str = "") -> MdfconvError:
         """Return an error about the file."""
         return MdfconvError(f"{self.path}: {reason}", hint, argument=argument)
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = len(names) - _MOST_NAMED
+    return ", ".join(names[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def parse_table(path: Path, lines: Iterable[str], *, by_number: bool = False) -> Table:
@@ -247,14 +353,16 @@ def parse_table(path: Path, lines: Iterable[str], *, by_number: bool = False) ->
     Raises `MdfconvError` if there are no numbers, or a line has others than numbers or too many or
     few of them.
     """
-    rows, comments = [], []
-    for place, line in enumerate(lines, start=1):
-        if mark := _COMMENT.match(line):
-            comments.append(line[mark.end() :].strip())
-        elif line.strip():
-            rows.append((place, line.strip()))
-    form = _form_of([line for _, line in rows[: _LOOKED_AT + 2]])
-    headers, numbers = _numbers(path, rows, form)
+    lines = list(lines)
+    form = _form_of(lines)
+    rows = _Rows(path, form)
+    start = 0
+    while start < len(lines):
+        # Line by line up to the first numbers.
+        end = start + (_BLOCK if rows.blocks else 1)
+        rows.add(start, lines[start:end])
+        start = end
+    numbers, headers, comments = rows.numbers(), rows.headers, rows.comments
     width = numbers.shape[1]
     notes: tuple[str, ...] = ()
     if form.decimal_comma:
@@ -270,36 +378,72 @@ def parse_table(path: Path, lines: Iterable[str], *, by_number: bool = False) ->
     return table if is_named else _named_in_comments(table, form)
 
 
-def _form_of(lines: Sequence[str]) -> TableForm:
+def _form_of(lines: Iterable[str]) -> TableForm:
     """Return the form under which the most lines are numbers, more than one a line if any is."""
-    wide = [sum(len(form.numbers(line) or ()) > 1 for line in lines) for form in _FORMS]
+    looked_at = list(_first_rows(lines))
+    wide = [sum(len(form.numbers(line) or ()) > 1 for line in looked_at) for form in _FORMS]
     if max(wide):
         return _FORMS[wide.index(max(wide))]
-    first = lines[0] if lines else ""
+    first = looked_at[0] if looked_at else ""
     return next((form for form in _FORMS if form.separator and form.separator in first), _BLANKS)
 
 
-def _numbers(
-    path: Path, rows: Sequence[tuple[int, str]], form: TableForm
-) -> tuple[list[tuple[int, str]], Array]:
-    """Return the lines before the first row of numbers, and the numbers."""
-    headers: list[tuple[int, str]] = []
-    numbers: list[tuple[int, list[float]]] = []
-    for place, line in rows:
-        row = form.numbers(line)
-        if row is not None:
-            numbers.append((place, row))
-        elif numbers or len(headers) > 1:
-            raise _no_numbers(path, place, line)
-        else:
-            headers.append((place, line))
-    if not numbers:
-        raise MdfconvError(f"{path}: no numeric rows")
-    width = len(numbers[0][1])
-    for place, row in numbers:
-        if len(row) != width:
-            raise MdfconvError(f"{path}, line {place}: {len(row)} columns where {width} go")
-    return headers, np.array([row for _, row in numbers])
+def _first_rows(lines: Iterable[str]) -> Iterator[str]:
+    """Yield the first lines that are no comments, fewer if they are long."""
+    characters = count = 0
+    for line in lines:
+        if line.strip() and not _COMMENT.match(line):
+            yield line.strip()
+            characters += len(line)
+            count += 1
+        # The first two may be headers.
+        if count >= _LOOKED_AT + 2 or (count > 3 and characters > _CHARACTERS_LOOKED_AT):
+            return
+
+
+class _Rows:
+    """The rows of a table as they are read, and what stands above and between them."""
+
+    def __init__(self, path: Path, form: TableForm) -> None:
+        self._path, self._form = path, form
+        self.blocks: list[Array] = []
+        self.headers: list[tuple[int, str]] = []
+        self.comments: list[str] = []
+
+    def add(self, start: int, lines: Sequence[str]) -> None:
+        """Add the lines after so many; raise `MdfconvError` if one does not belong there."""
+        block = self._form.plain_numbers(lines) if self.blocks else None
+        if block is None or block.shape[1] != self.blocks[0].shape[1]:
+            block = self._looked_at(start, lines)
+        if block.size:
+            self.blocks.append(block)
+
+    def _looked_at(self, start: int, lines: Sequence[str]) -> Array:
+        """Return the numbers of lines, each of which may be anything."""
+        rows: list[Array] = []
+        for place, line in enumerate(lines, start=start + 1):
+            if mark := _COMMENT.match(line):
+                self.comments.append(line[mark.end() :].strip())
+                continue
+            line = line.strip()
+            row = self._form.numbers(line) if line else []
+            if row is None:
+                if self.blocks or len(self.headers) > 1:
+                    raise _no_numbers(self._path, place, line)
+                self.headers.append((place, line))
+            elif row:
+                width = self.blocks[0].shape[1] if self.blocks else len(row)
+                if len(row) != width:
+                    reason = f"{len(row)} columns where {width} go"
+                    raise MdfconvError(f"{self._path}, line {place}: {reason}")
+                rows.append(np.array(row))
+        return np.array(rows)
+
+    def numbers(self) -> Array:
+        """Return all rows; raise `MdfconvError` if there are none."""
+        if not self.blocks:
+            raise MdfconvError(f"{self._path}: no numeric rows")
+        return np.concatenate(self.blocks)
 
 
 def _headings(
@@ -342,5 +486,6 @@ def _named_in_comments(table: Table, form: TableForm) -> Table:
         angles = sum(role_of(name) is not None for name in names)
         if angles > 1 or (angles and any(map(is_value, names))):
             note = f"the names of the columns are taken from the comment '{comment[:60]}'"
-            return replace(table, names=names, is_named=True, notes=(*table.notes, note))
+            notes = (*table.notes, note)
+            return replace(table, names=names, is_named=True, notes=notes, named_by=comment)
     return table

@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from mdfconv.brdf.microfacet import mirrored, polar_angle
 from mdfconv.distributions.evaluation import Array
+from mdfconv.errors import MdfconvError
 from mdfconv.measured import samples
 from mdfconv.measured.readers import tables
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source
 from mdfconv.measured.readers.tables import Role, Table, parse_table
-from mdfconv.measured.samples import UNITS, DirectionalSamples, Measurements
+from mdfconv.measured.readers.values import ReadColumns, ValueColumns
+from mdfconv.measured.samples import UNITS, DirectionalSamples, Measurements, Samples
 from mdfconv.registry import unknown_name
 
 # What an angle of a table of one angle can be.
-HALF, REFLECTED, INCIDENT = "half", "reflected", "incident"
-_MEANINGS = (HALF, REFLECTED, INCIDENT)
+HALF, REFLECTED, INCIDENT, SPECULAR = "half", "reflected", "incident", "specular"
 # In the order of an option each: the zeniths are the first and the third.
 DIRECTIONS = (Role.theta_i, Role.phi_i, Role.theta_o, Role.phi_o)
+_MEANINGS = {
+    HALF: Role.angle,
+    REFLECTED: Role.theta_o,
+    INCIDENT: Role.theta_i,
+    SPECULAR: Role.specular,
+}
+# Those that say where the outgoing direction is.
+_OUTGOING = {Role.theta_o, Role.specular}
 # By what a name says its unit, the first of them that it has.
 _MARKS = {"cosine": ("cos",), "degrees": ("deg", "°"), "radians": ("rad",)}
 # The angle of incidence as a comment says it.
@@ -32,11 +42,17 @@ _INCIDENCE = re.compile(
     re.I,
 )
 _INCIDENCE_UNITS = {"deg": "degrees", "°": "degrees", "rad": "radians"}
+# What is to be done about an angle whose meaning is open.
+_GIVE_INCIDENCE = "if these are detector angles give the angle of incidence"
 # Files hold rounded angles.
 _SLACK = 1 + 1e-6
 # How much sooner, in standard deviations of the angle, values fall off with one half vector than
 # with the other before it is said to be the right one: those of a diffuse surface differ by less.
 _CLEAR = 0.25
+# Values of a lobe about β = 0 are not less there than so much of the largest, if that is this far.
+_LEAST_AT_NORMAL = 0.5
+_FAR_FROM_NORMAL = np.radians(5)
+_WINDOW = 5
 
 
 def read_table(table: Table, options: ReadOptions) -> Measurements:
@@ -45,12 +61,13 @@ def read_table(table: Table, options: ReadOptions) -> Measurements:
     Raises `MdfconvError` if it stays open what the columns hold, or the angles are none.
     """
     meaning = options.angle_is
-    if meaning not in (None, *_MEANINGS):
+    if meaning is not None and meaning not in _MEANINGS:
         raise unknown_name("angle", meaning, list(_MEANINGS))
+    incidence = options.incidence
+    if incidence is not None and not 0 <= incidence < 90:
+        raise MdfconvError(f"{table.path}: an angle of incidence of {incidence:g}°", "0 to 90")
     columns = _Columns(table, options)
-    is_of_one = options.angle is not None or meaning is not None
-    directions = None if is_of_one else columns.directions()
-    return directions or columns.one_angle()
+    return columns.directions() or columns.one_angle()
 
 
 class _Columns:
@@ -62,76 +79,120 @@ class _Columns:
     def __init__(self, table: Table, options: ReadOptions) -> None:
         self._table, self._options = table, options
         self._notes = list(table.notes)
-        self._names = dict(enumerate(table.names)) if table.is_named else {}
-        named = ((index, name, table.numbers[:, index]) for index, name in self._names.items())
-        self._counting = [index for index, name, rows in named if tables.counts_rows(name, rows)]
+        # Columns of directions that others say, too.
+        self._redundant: set[int] = set()
 
     def directions(self) -> DirectionalSamples | None:
-        """Return samples of two directions; None if the table has no zenith of both."""
+        """Return samples of two directions; None if the table has no zenith of any."""
         table = self._table
         columns = self._by_role()
-        incidence = None if Role.theta_i in columns else self._incidence()
-        if Role.theta_o not in columns or not (Role.theta_i in columns or incidence):
-            if any(getattr(self._options, role.name) for role in DIRECTIONS):
-                hint = f"name both; there are {', '.join(table.names)}"
-                raise table.error("no column of the zenith of both directions", hint)
+        if not columns:
             return None
-        channels, values, value_notes = self._values(columns.values())
         unit = self._unit_of_directions(columns)
+        fixed = self._fixed_zenith(columns, unit)
+        data = self._values(columns.values())
         columns = self._exchanged(columns, 90.0 if unit == "degrees" else np.pi / 2)
-        to_radians = np.pi / 180 if unit == "degrees" else 1.0
-        angles = {role: table.numbers[:, index] * to_radians for role, index in columns.items()}
-        if incidence:
-            number, mark = float(incidence["number"]), incidence["unit"]
-            stored = _INCIDENCE_UNITS[mark.lower()] if mark else unit
-            angle = np.radians(number) if stored == "degrees" else number
-            angles[Role.theta_i] = np.full(len(table.numbers), angle)
-            self._notes.append(
-                f"the angle of incidence, {number:g} {stored}, is from the comment "
-                f"'{incidence.string[:60]}'"
-            )
-        self._complete_azimuths(angles)
+        angles = {role: _radians(data.angles[index], unit) for role, index in columns.items()}
+        if fixed:
+            role, degrees = fixed
+            angles[role] = np.full(len(data.values), np.radians(degrees))
+        is_specular = Role.specular in angles
+        if is_specular:
+            angles[Role.theta_o] = self._from_mirror(columns, angles)
+        self._complete_azimuths(angles, moves_out=Role.theta_i not in columns)
         light = angles[Role.theta_i], angles[Role.phi_i]
         view = angles[Role.theta_o], angles[Role.phi_o]
-        notes = (*self._notes, *value_notes)
-        return _oriented(
-            samples.directional_samples(table.path, *light, *view, values, channels, notes)
+        found = samples.directional_samples(
+            table.path,
+            *(*light, *view, data.values),
+            channels=data.channels,
+            notes=(*self._notes, *data.notes),
+            about=table.about,
+            uncertainty=data.uncertainty,
         )
+        return found if is_specular else oriented(found)
 
-    def one_angle(self) -> Measurements:
-        """Return samples of one angle, or of two directions of which one is the normal."""
-        table, meaning = self._table, self._options.angle_is
+    def one_angle(self) -> Samples:
+        """Return samples against the angle of the half vector."""
+        table, options = self._table, self._options
         column = self._angle_column()
-        channels, values, value_notes = self._values([column])
-        angle, unit = table.numbers[:, column], self._unit_of_angle(column)
-        notes = (*self._notes, *value_notes)
-        if meaning in (REFLECTED, INCIDENT):
-            if unit == "cosine":
-                # NaN outside the range, which is left out with a note.
-                angle = np.where(np.abs(angle) <= 1, angle, np.nan)
-            theta = UNITS[unit].to_radians(angle)
-            zero = np.zeros_like(theta)
-            still = INCIDENT if meaning == REFLECTED else REFLECTED
-            taken = f"the {still} one is taken to be the normal"
-            notes += (f"the angle is that of the {meaning} direction; {taken}",)
-            zeniths = (theta, zero) if meaning == INCIDENT else (zero, theta)
-            angles = zeniths[0], zero, zeniths[1], zero
-            return samples.directional_samples(table.path, *angles, values, channels, notes)
-        if not (table.is_named and tables.is_half(table.names[column])):
-            other = "" if meaning else ", not of a direction"
+        is_half = self._is_half(column)
+        if options.incidence is not None:
+            reason = f"{table.listed([column])} holds the angle of the half vector"
+            raise table.error(reason, "it has no angle of incidence")
+        data, unit = self._values([column]), self._unit_of_angles([column])
+        notes = (*self._notes, *data.notes)
+        if not is_half:
+            other = "" if options.angle_is else ", not of a direction"
             read = f"{table.listed([column])} is read as the angle between normal and half vector"
             notes += (read + other,)
-        return samples.samples(table.path, angle, unit, values, channels, "ndf", notes)
+        angle = data.angles[column]
+        is_assumed = not (is_half or options.angle_is)
+        if is_assumed and (angle < -1e-6).any():
+            reason = f"{unit} {np.nanmin(angle):g} is outside 0 to {UNITS[unit].largest:.6g}, "
+            reason += "an angle from the normal to the horizon"
+            raise table.error(reason, _GIVE_INCIDENCE, argument="incidence")
+        what = data.values, data.channels, "ndf", notes, table.about, data.uncertainty
+        result = samples.samples(table.path, angle, unit, *what)
+        peak = _peak_off_normal(result) if is_assumed else None
+        if peak is not None:
+            reason = f"{table.listed([column])} is no angle of half vectors: there is no lobe to "
+            reason += f"fit about 0, the values peak at {np.degrees(peak):.3g} degrees"
+            raise table.error(reason, _GIVE_INCIDENCE, argument="incidence")
+        return result
 
     def _by_role(self) -> dict[Role, int]:
-        """Return the columns of angles by what they hold."""
+        """Return the columns of directions by what they hold; none if the angle is of one."""
         table, options = self._table, self._options
         named = {role: getattr(options, role.name) for role in DIRECTIONS}
-        chosen = {role: table.column(name) for role, name in named.items() if name}
+        chosen = {role: self._chosen(role, name) for role, name in named.items() if name}
+        if options.angle is not None or options.angle_is is not None:
+            if chosen:
+                reason = "columns are chosen of one angle and of two directions"
+                raise table.error(reason, "choose either")
+            index = self._angle_column()
+            role = self._role_of_one(index)
+            if role is Role.angle:
+                return {}
+            chosen = {role: index}
+        columns, bare = self._with_names(chosen)
+        if not columns.keys() & _OUTGOING:
+            if Role.theta_i in columns:
+                outgoing = bare
+            elif options.incidence is not None:
+                outgoing = bare if len(bare) == 1 else [self._angle_column()]
+                outgoing = [index for index in outgoing if not self._is_half(index)]
+            else:
+                outgoing = []
+            if len(outgoing) == 1:
+                columns[Role.theta_o] = outgoing[0]
+                self._notes.append(f"{table.listed(outgoing)} is taken for the {Role.theta_o}")
+        if columns.keys() & {Role.theta_i, *_OUTGOING}:
+            return columns
+        if chosen:
+            hint = f"name both; there are {table.known}"
+            raise table.error("no column of the zenith of both directions", hint)
+        return {}
+
+    def _chosen(self, role: Role, name: str) -> int:
+        """Return the column that the user chooses for a direction."""
+        table = self._table
+        try:
+            return table.column(name)
+        except MdfconvError as error:
+            if role is not Role.theta_i or not re.fullmatch(r"\d+(\.\d*)?", name):
+                raise
+            hint = f"{error.hint}; an angle of incidence is given by itself"
+            raise MdfconvError(error.reason, hint, argument="incidence") from None
+
+    def _with_names(self, chosen: dict[Role, int]) -> tuple[dict[Role, int], list[int]]:
+        """Return the columns of directions with those that names say, and those of any angle."""
+        table, options = self._table, self._options
+        others = {table.column(name) for name in (*options.values, *options.uncertainty)}
         columns, bare = dict(chosen), []
-        for index, name in self._names.items():
+        for index, name in self._table.named.items():
             role = tables.role_of(name)
-            if index in chosen.values() or name in options.values or role is None or role in chosen:
+            if role is None or role in chosen or index in others or index in chosen.values():
                 continue
             if role is Role.angle:
                 bare.append(index)
@@ -141,10 +202,74 @@ class _Columns:
                 raise table.error(f"{both} are both the {role}", "choose one", argument=argument)
             else:
                 columns[role] = index
-        if Role.theta_i in columns and Role.theta_o not in columns and len(bare) == 1:
-            columns[Role.theta_o] = bare[0]
-            self._notes.append(f"{table.listed(bare)} is taken for the {Role.theta_o}")
-        return columns
+        if columns.keys() >= _OUTGOING:
+            # One of them says it all.
+            other = Role.theta_o if Role.specular in chosen else Role.specular
+            self._redundant.add(columns.pop(other))
+        return columns, bare
+
+    def _role_of_one(self, index: int) -> Role:
+        """Return what the column of a table of one angle holds."""
+        options = self._options
+        if options.angle_is:
+            return _MEANINGS[options.angle_is]
+        role = tables.role_of(self._table.named.get(index, ""))
+        if role in (Role.theta_i, *_OUTGOING):
+            return role
+        is_scan = options.incidence is not None and not self._is_half(index)
+        return Role.theta_o if is_scan else Role.angle
+
+    def _is_half(self, index: int) -> bool:
+        return tables.is_half(self._table.named.get(index, ""))
+
+    def _fixed_zenith(self, columns: dict[Role, int], unit: str) -> tuple[Role, float] | None:
+        """Return the direction whose zenith no column has, and that in degrees."""
+        table, options = self._table, self._options
+        has_outgoing = columns.keys() & _OUTGOING
+        moves_in = Role.theta_i in columns
+        if moves_in and options.incidence is not None:
+            if has_outgoing or options.angle_is != INCIDENT:
+                reason = f"{table.listed([columns[Role.theta_i]])} has the angle of incidence"
+                raise table.error(reason, "leave out the one for all rows")
+        elif moves_in and has_outgoing:
+            return None
+        fixed = Role.theta_i if has_outgoing else Role.theta_o
+        if options.incidence is not None:
+            return fixed, options.incidence
+        comment = self._incidence() if has_outgoing else None
+        if comment:
+            number, mark = float(comment["number"]), comment["unit"]
+            stored = _INCIDENCE_UNITS[mark.lower()] if mark else unit
+            self._notes.append(
+                f"the angle of incidence, {number:g} {stored}, is from the comment "
+                f"'{comment.string[:60]}'"
+            )
+            return fixed, float(np.degrees(number)) if stored == "radians" else number
+        meaning = options.angle_is
+        if meaning in (REFLECTED, INCIDENT):
+            still = INCIDENT if meaning == REFLECTED else REFLECTED
+            taken = f"the {still} one is taken to be the normal"
+            self._notes.append(f"the angle is that of the {meaning} direction; {taken}")
+            return fixed, 0.0
+        if not has_outgoing:
+            hint = f"name both; there are {table.known}"
+            raise table.error("no column of the zenith of both directions", hint)
+        role = next(iter(has_outgoing))
+        reason = f"{table.listed([columns[role]])} is the {role}, and the incident one is missing"
+        raise table.error(reason, "give the angle of incidence", argument="incidence")
+
+    def _from_mirror(self, columns: dict[Role, int], angles: dict[Role, Array]) -> Array:
+        """Return the outgoing zeniths of a scan about the mirror direction."""
+        table, index = self._table, columns[Role.specular]
+        if columns.keys() & {Role.phi_i, Role.phi_o, Role.phi}:
+            reason = f"{table.listed([index])} is the {Role.specular}, and there are azimuths"
+            raise table.error(reason, "it is read in the plane of incidence")
+        sign = tables.sign_from_mirror(self._table.named.get(index, "")) or 1
+        where = "horizon" if sign > 0 else "normal"
+        self._notes.append(
+            f"{table.listed([index])} is the {Role.specular}, positive towards the {where}"
+        )
+        return angles[Role.theta_i] + sign * angles[Role.specular]
 
     def _angle_column(self) -> int:
         """Return the column of angles of a table of one angle."""
@@ -159,47 +284,23 @@ class _Columns:
                 raise table.error(reason, hint, argument="angle")
             self._notes += ["no names of columns: the first is taken for the angle"] * several
             return 0
-        angles = [index for index, name in self._names.items() if tables.is_angle(name)]
-        if len(angles) == 1:
-            return angles[0]
-        rest = [index for index in self._names if index not in self._counting]
-        others = [index for index in rest[1:] if not tables.is_value(table.names[index])]
+        named, wanted = table.named, _MEANINGS.get(self._options.angle_is or "")
+        angles = [index for index, name in named.items() if tables.is_angle(name)]
+        meant = [index for index in angles if wanted and tables.role_of(named[index]) is wanted]
+        if len(angles) == 1 or len(meant) == 1:
+            return (*meant, *angles)[0]
+        passed = {index for index, name in named.items() if _is_beside(name)} | table.counting
+        rest = [index for index in named if index not in passed]
+        others = [index for index in rest[1:] if not tables.is_value(named[index])]
         if angles or not rest or (len(rest) > 2 and others):
             which = "several columns are" if angles else "no column is"
-            reason = f"{which} called an angle; there are {', '.join(table.names)}"
+            reason = f"{which} called an angle; there are {table.known}"
             raise table.error(reason, "choose the column of angles", argument="angle")
         self._notes.append(f"{table.listed(rest[:1])} is taken for the angle")
         return rest[0]
 
-    def _values(self, angles: Collection[int]) -> tuple[tuple[str, ...], Array, list[str]]:
-        """Return the names and columns of values, and notes on what is passed over."""
-        columns, notes = self._value_columns(angles)
-        names = tuple(self._table.names[index] for index in columns)
-        return names, self._table.numbers[:, columns], notes
-
-    def _value_columns(self, angles: Collection[int]) -> tuple[list[int], list[str]]:
-        table = self._table
-        for index, name in self._names.items():
-            different = np.unique(table.numbers[:, index]).size
-            if tables.is_wavelength(name) and different > 1:
-                reason = f"column '{name}' has {different} wavelengths, whose values would be mixed"
-                raise table.error(reason, "keep the rows of one")
-        if self._options.values:
-            return [table.column(name) for name in self._options.values], []
-        counting = [index for index in self._counting if index not in angles]
-        rest = [index for index in range(len(table.names)) if index not in (*angles, *counting)]
-        chosen = [index for index in rest if tables.is_value(self._names.get(index, ""))] or rest
-        if not chosen:
-            which = "one column is" if len(table.names) == 1 else "the columns are"
-            raise table.error(f"{which} not enough", "it takes an angle and a value")
-        remark = "counts the rows and is passed over"
-        notes = [f"column '{table.names[index]}' {remark}" for index in counting]
-        others = [index for index in rest if index not in chosen]
-        if others:
-            notes.append(
-                f"{table.listed(chosen)} taken for values; not read: {table.listed(others)}"
-            )
-        return chosen, notes
+    def _values(self, angles: Collection[int]) -> ReadColumns:
+        return ValueColumns(self._table, self._options, self._redundant).read(set(angles))
 
     def _unit(self, columns: Collection[int]) -> str | None:
         """Return the unit of columns of angles that the user or the names say, if they do."""
@@ -214,20 +315,25 @@ class _Columns:
         marked = (unit for unit, marks in _MARKS.items() if any(mark in text for mark in marks))
         return next(marked, None)
 
-    def _unit_of_angle(self, column: int) -> str:
-        unit = self._unit([column])
-        if unit or self._largest(column) > UNITS["radians"].largest * _SLACK:
+    def _unit_of_angles(self, columns: Sequence[int]) -> str:
+        unit = self._unit(columns)
+        if unit or max(map(self._largest, columns)) > UNITS["radians"].largest * _SLACK:
             return unit or "degrees"
         raise self._table.error(
-            f"column '{self._table.names[column]}' does not say whether it holds degrees, radians "
-            "or cosines",
+            f"column '{self._table.names[columns[0]]}' does not say whether it holds degrees, "
+            "radians or cosines",
             "name the unit of the angles",
             argument="angle_unit",
         )
 
     def _unit_of_directions(self, columns: dict[Role, int]) -> str:
-        unit = self._unit(columns.values())
-        if unit == "cosine":
+        is_specular = Role.specular in columns
+        is_scan = len(columns) == 1 and not is_specular
+        # A narrow range of degrees looks like one of radians.
+        is_open = is_specular or (is_scan and self._options.angle_is is not None)
+        indices = list(columns.values())
+        unit = self._unit_of_angles(indices) if is_open else self._unit(indices)
+        if unit == "cosine" and not is_scan:
             raise self._table.error(
                 "directions in cosines", "angles in degrees or radians are read"
             )
@@ -246,8 +352,12 @@ class _Columns:
         return unit
 
     def _exchanged(self, columns: dict[Role, int], horizon: float) -> dict[Role, int]:
-        """Return the columns, zeniths and azimuths exchanged if the ranges allow nothing else."""
-        if not all(role in columns for role in DIRECTIONS):
+        """Return the columns, zeniths and azimuths exchanged if the ranges allow nothing else.
+
+        Those that the user chooses are not.
+        """
+        is_chosen = any(getattr(self._options, role.name) for role in DIRECTIONS)
+        if is_chosen or not all(role in columns for role in DIRECTIONS):
             return columns
         zeniths, azimuths = ([columns[role] for role in DIRECTIONS[n::2]] for n in (0, 1))
         zenith, azimuth = (max(map(self._largest, pair)) for pair in (zeniths, azimuths))
@@ -272,8 +382,8 @@ class _Columns:
         matches = [m for comment in self._table.comments for m in _INCIDENCE.finditer(comment)]
         return matches[0] if len({float(match["number"]) for match in matches}) == 1 else None
 
-    def _complete_azimuths(self, angles: dict[Role, Array]) -> None:
-        """Add the azimuths that the table does not have."""
+    def _complete_azimuths(self, angles: dict[Role, Array], *, moves_out: bool) -> None:
+        """Add the azimuths that the table does not have; 0 is that of the direction that moves."""
         zero = np.zeros_like(angles[Role.theta_o])
         missing = [role for role in (Role.phi_i, Role.phi_o) if role not in angles]
         if not missing:
@@ -283,7 +393,8 @@ class _Columns:
             angles |= {Role.phi_i: zero, Role.phi_o: angles[Role.phi]}
         elif len(missing) == 2:
             note = "no azimuths: all directions are taken to lie in the plane of incidence"
-            angles |= {Role.phi_i: zero, Role.phi_o: zero + np.pi}
+            still, moving = (Role.phi_i, Role.phi_o) if moves_out else (Role.phi_o, Role.phi_i)
+            angles |= {moving: zero, still: zero + np.pi}
         else:
             which = "outgoing" if missing == [Role.phi_o] else "incident"
             note = f"no azimuth of the {which} direction: it is taken to be 0"
@@ -291,7 +402,12 @@ class _Columns:
         self._notes.append(note)
 
 
-def _oriented(data: DirectionalSamples) -> DirectionalSamples:
+def _is_beside(name: str) -> bool:
+    """Return whether a name is that of a column beside angles and values."""
+    return tables.is_uncertainty(name) or tables.is_wavelength(name)
+
+
+def oriented(data: DirectionalSamples) -> DirectionalSamples:
     """Return samples with the incident directions turned by 180° if the lobe lies there.
 
     Azimuths of incidence are taken to be those towards the light; a note says if the file turned
@@ -305,7 +421,8 @@ def _oriented(data: DirectionalSamples) -> DirectionalSamples:
             "incidence is that of the light's travel and is turned by 180°"
         )
         return replace(turned, notes=(*data.notes, note))
-    is_oblique = np.hypot(*data.incident[:, :2].T).max() > 1e-6
+    sines = np.hypot(*data.incident[:, :2].T) * np.hypot(*data.outgoing[:, :2].T)
+    is_oblique = sines.max() > 1e-6
     if advantage > _CLEAR or not is_oblique:
         return data
     note = (
@@ -313,6 +430,28 @@ def _oriented(data: DirectionalSamples) -> DirectionalSamples:
         "opposite to the azimuth of incidence"
     )
     return replace(data, notes=(*data.notes, note))
+
+
+def _radians(angle: Array, unit: str) -> Array:
+    """Return zeniths or azimuths in radians; NaN, which is left out, for what is no cosine."""
+    if unit == "cosine":
+        angle = np.where(np.abs(angle) <= 1, angle, np.nan)
+    return UNITS[unit].to_radians(angle)
+
+
+def _peak_off_normal(data: Samples) -> float | None:
+    """Return where values are largest, radians, if they do not fall off from β = 0."""
+    largest = np.abs(data.values).max(axis=0)
+    curve = np.sum(data.values / np.where(largest > 0, largest, 1), axis=1)
+    if curve.size < _WINDOW:
+        return None
+    # A single row may be an outlier.
+    smooth = np.median(sliding_window_view(curve, _WINDOW), axis=-1)
+    at = int(np.argmax(smooth))
+    peak = float(data.beta[at + _WINDOW // 2])
+    is_far = peak - data.beta[0] > _FAR_FROM_NORMAL
+    is_low = curve[: _WINDOW // 2 + 1].max() < _LEAST_AT_NORMAL * smooth[at]
+    return peak if is_far and is_low else None
 
 
 def _fall(data: DirectionalSamples) -> float:

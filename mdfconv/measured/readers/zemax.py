@@ -18,9 +18,11 @@ from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.readers.base import Reader, ReadOptions, Source, known_by, turn_from_normal
 from mdfconv.measured.readers.tables import number
-from mdfconv.measured.samples import DirectionalSamples, directional_samples
+from mdfconv.measured.samples import DirectionalSamples, about_of, directional_samples
 
 _KNOWN_BY = re.compile(r"^\s*AngleOfIncidence\s", re.M | re.I)
+# Comments that only enclose others, as [BEGIN] and [END].
+_BRACKET = re.compile(r"\[(begin|end)\]", re.I)
 _WORDS = ("source", "symmetry", "spectralcontent", "scattertype")
 # The axes of the values, of which the first may be missing.
 _ANGLES = ("samplerotation", "angleofincidence", "scatterazimuth", "scatterradial")
@@ -32,12 +34,15 @@ class _Words:
 
     def __init__(self, source: Source) -> None:
         self._source = source
+        lines = source.lines()
         self._words = [
             (number, word)
-            for number, line in enumerate(source.lines(), start=1)
+            for number, line in enumerate(lines, start=1)
             if not line.lstrip().startswith("#")
             for word in line.split()
         ]
+        comments = (line.strip(" \t#") for line in lines if line.lstrip().startswith("#"))
+        self.about = about_of(comment for comment in comments if not _BRACKET.match(comment))
         self._at = 0
 
     def peek(self) -> str | None:
@@ -91,7 +96,7 @@ def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
         tables.append(_channel(words, [axis.size for axis in axes]))
     if not tables or words.peek() is not None:
         raise words.error(f"no data, or something else than data: {str(words.peek())[:30]}")
-    return _samples(source.path, axes, np.stack(tables, axis=-1), channels)
+    return _samples(source.path, axes, np.stack(tables, axis=-1), channels, words.about)
 
 
 def _header(source: Source, words: _Words) -> list[Array]:
@@ -128,7 +133,11 @@ def _channel(words: _Words, shape: Sequence[int]) -> Array:
 
 
 def _samples(
-    path: Path, axes: list[Array], values: Array, channels: Sequence[str]
+    path: Path,
+    axes: list[Array],
+    values: Array,
+    channels: Sequence[str],
+    about: tuple[str, ...],
 ) -> DirectionalSamples:
     # At the specular direction all azimuths are one sample.
     is_sample = np.ones(values.shape[:-1], bool)
@@ -140,12 +149,12 @@ def _samples(
         angle[is_sample & measured] for angle in np.meshgrid(*axes, indexing="ij")
     )
     # About the specular direction at azimuth 0, where x points away from the normal.
-    about = microfacet.direction(radial, np.pi + azimuth)
-    outgoing = turn_from_normal(about, incidence, rotation)
+    scattered = microfacet.direction(radial, np.pi + azimuth)
+    outgoing = turn_from_normal(scattered, incidence, rotation)
     view = microfacet.polar_angle(outgoing), microfacet.azimuth(outgoing)
     values = values[is_sample & measured]
     return directional_samples(
-        path, incidence, np.pi + rotation, *view, values, tuple(channels), notes
+        path, incidence, np.pi + rotation, *view, values, tuple(channels), notes, about
     )
 
 

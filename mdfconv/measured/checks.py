@@ -78,6 +78,8 @@ _ALBEDO_ANGLES = (0.0, 45.0, 75.0)
 _LEAST_STEPS, _LEAST_APERTURES = 4.0, 3.0
 # One parameter stands for all angles of incidence if those of each differ no more.
 _DRIFT = 0.2
+# Steps of less than this share of the whole do not turn a trend around.
+_FLAT = 0.1
 _CORRELATED = 0.95
 # Incidences from here on tell mirror direction and light apart, degrees.
 _OBLIQUE = 15.0
@@ -433,7 +435,7 @@ def _where_it_fails(samples: Measurements, square: Array) -> str:
     return where
 
 
-def _coordinates(samples: Measurements) -> Iterator[tuple[Array, Array, tuple[str, str]]]:
+def _coordinates(samples: Measurements) -> Iterator[tuple[Array, Array, tuple[str, ...]]]:
     """Yield angles of samples, degrees, with steps, and the names of what is below and above."""
     ends = "at {} < {{:g}}°", "at {} ≥ {{:g}}°"
     if not isinstance(samples, DirectionalSamples):
@@ -496,10 +498,14 @@ def checks_of(
         Those that apply.
     """
     checks: list[Check | None] = []
+    peaks: list[tuple[float, float]] = []
     if isinstance(samples, DirectionalSamples):
-        checks += [_energy(samples, fit), _reflectance(fit, error), _mirror_side(samples)]
+        groups = incidence_groups(samples)
+        checks += [_energy(fit, groups[-1][0]), _reflectance(fit, error)]
+        checks.append(_mirror_side(samples, groups))
+        peaks = [_peak(samples.select(index)) for _, index in groups]
     checks += [
-        _resolution(samples, fit, aperture, error),
+        _resolution(samples, fit, peaks, aperture, error),
         _one_parameter(fit, by_incidence),
         _ranges(fit),
         _correlation(fit),
@@ -510,8 +516,11 @@ def checks_of(
     return [check for check in checks if check is not None]
 
 
-def _energy(samples: DirectionalSamples, fit: MeasuredFit) -> Check:
-    """Check that no more light leaves the surface than falls on it."""
+def _energy(fit: MeasuredFit, largest: float) -> Check:
+    """Check that no more light leaves the surface than falls on it.
+
+    Up to the largest angle of incidence, degrees, the fit is of measurements.
+    """
     whole = np.array([np.max(fit.albedo(np.radians(angle))) for angle in _ALBEDO_ANGLES])
     shares = ", ".join(
         f"{_percent(share)} at {angle:g}°"
@@ -521,7 +530,6 @@ def _energy(samples: DirectionalSamples, fit: MeasuredFit) -> Check:
     if (whole <= 1).all():
         return Check("energy", True, f"{text}.")
     text += ": more light than falls on it"
-    largest = np.degrees(polar_angle(samples.incident).max())
     extrapolated = np.array(_ALBEDO_ANGLES) > largest
     if (whole[~extrapolated] <= 1).all():
         return Check("energy", False, f"{text}. No incidence beyond {largest:.3g}° was measured.")
@@ -556,13 +564,15 @@ def _reflectance(fit: MeasuredFit, error: float) -> Check | None:
     return Check("reflectance", passed, f"{text}.")
 
 
-def _mirror_side(samples: DirectionalSamples) -> Check | None:
+def _mirror_side(
+    samples: DirectionalSamples, groups: Sequence[tuple[float, Indices]]
+) -> Check | None:
     """Check that light leaves on the side of the mirror direction, not where it came from."""
     along = -dot(samples.incident[:, :2], samples.outgoing[:, :2])
     with np.errstate(divide="ignore", invalid="ignore"):
         logarithm = np.log(samples.values.mean(axis=1))
     ratios = []
-    for angle, index in incidence_groups(samples):
+    for angle, index in groups:
         away, towards = index[along[index] > 0], index[along[index] < 0]
         if angle >= _OBLIQUE and away.size and towards.size:
             ratios.append(_median(logarithm[towards]) - _median(logarithm[away]))
@@ -578,7 +588,11 @@ def _mirror_side(samples: DirectionalSamples) -> Check | None:
 
 
 def _resolution(
-    samples: Measurements, fit: MeasuredFit, aperture: float | None, error: float
+    samples: Measurements,
+    fit: MeasuredFit,
+    peaks: Sequence[tuple[float, float]],
+    aperture: float | None,
+    error: float,
 ) -> Check | None:
     """Check that the steps, and the aperture, are small against the lobe.
 
@@ -587,7 +601,6 @@ def _resolution(
     lobes = np.array([fit.parameter, fit.parameter if fit.second is None else fit.second])
     half_width = np.degrees(float(np.min(fit.distribution.half_width(lobes))))
     if isinstance(samples, DirectionalSamples):
-        peaks = [_peak(samples.select(index)) for _, index in incidence_groups(samples)]
         step, half = np.median(peaks, axis=0)
         # The outgoing direction turns by twice the angle of the half vector.
         angle, width = "θ_o", 4 * half_width
@@ -635,13 +648,16 @@ def _one_parameter(fit: MeasuredFit, by_incidence: Sequence[IncidenceFit]) -> Ch
     known.sort(key=lambda one: one.angle)
     parameter = np.array([one.parameter for one in known])
     low, high = (known[index] for index in (np.argmin(parameter), np.argmax(parameter)))
-    certain = 2 * np.hypot(low.parameter_error, high.parameter_error)
+    uncertain = 2 * np.hypot(low.parameter_error, high.parameter_error)
     alpha = fit.distribution.peak_alpha(parameter)
-    drifts = np.ptp(parameter) > certain and np.ptp(alpha) > _DRIFT * np.median(alpha)
-    ends, rising = (known[0], known[-1]), np.diff(parameter) > 0
-    if drifts and rising.all() == rising.any():
-        verb = "rises" if rising.all() else "falls"
-        text = f"{verb} from {_at(ends[0])} to {_at(ends[1])}"
+    drifts = np.ptp(parameter) > uncertain and np.ptp(alpha) > _DRIFT * np.median(alpha)
+    steps = np.diff(parameter)
+    steps = steps[np.abs(steps) > max(uncertain, _FLAT * np.ptp(parameter))]
+    first, last = known[0], known[-1]
+    if drifts and last is high and (steps > 0).all():
+        text = f"rises from {_at(first)} to {_at(last)}"
+    elif drifts and last is low and (steps < 0).all():
+        text = f"falls from {_at(first)} to {_at(last)}"
     else:
         text = f"is between {_at(low)} and {_at(high)}"
     text = f"By angle of incidence {fit.distribution.parameter.symbol} {text}"

@@ -426,6 +426,7 @@ def by_incidence(*parameters, error=0.001):
     [
         (by_incidence(0.42, 0.35, 0.21), False, "α falls from 0.42 (θ_i = 15°) to 0.21"),
         (by_incidence(0.21, 0.3, 0.35), False, "α rises from 0.21"),
+        (by_incidence(0.42, 0.43, 0.21), False, "α falls from 0.42 (θ_i = 15°) to 0.21"),
         (by_incidence(0.3, 0.2, 0.31), False, "between 0.2 (θ_i = 45°) and 0.31 (θ_i = 70°)"),
         (by_incidence(0.3, 0.31, 0.29), True, "between 0.29"),
         (by_incidence(0.3, 0.4, 0.2, error=0.09), True, "between 0.2"),

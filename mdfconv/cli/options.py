@@ -206,8 +206,8 @@ def in_asked_forms(
 ) -> list[dict[str, Any]]:
     """Return rows of results with each parameter, and its error, in the forms asked for.
 
-    A row has a ``distribution`` by name, its ``parameter``, and perhaps the ``parameter_stderr``; one of
-    another distribution stays as it is.
+    A row has a ``distribution`` by name, its ``parameter``, and perhaps the ``parameter_stderr``;
+    one of another distribution stays as it is.
     """
     rows_asked = []
     for row in rows:

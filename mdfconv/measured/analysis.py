@@ -26,7 +26,7 @@ from mdfconv.measured.model import (
     candidate,
 )
 from mdfconv.measured.samples import DirectionalSamples, Measurements, Samples, note_of
-from mdfconv.measured.scans import estimate_noise
+from mdfconv.measured.scans import median, noise_of
 from mdfconv.measured.validation import IncidenceFit, by_incidence, validated
 
 # Beyond it the readings of goniometers fall off, and masking is large, degrees.
@@ -78,16 +78,21 @@ class ChannelFits:
 
     @cached_property
     def log_ratio(self) -> Array:
-        """ln(fit/data) of the recommended fit, shape (n, channels); NaN where one is not positive."""
+        """ln(fit/data) of the recommended fit, shape (n, channels); NaN where it does not exist."""
         near = self.recommended.model(self.samples)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.log(near / self.samples.values)
         return np.where(np.isfinite(ratio), ratio, np.nan)
 
     @cached_property
+    def noises(self) -> Array:
+        """The relative standard deviation of each sample from its neighbours, shape (n,)."""
+        return noise_of(self.samples, self.log_ratio)
+
+    @property
     def noise(self) -> float:
-        """The relative standard deviation of the samples from their neighbours."""
-        return estimate_noise(self.samples, self.log_ratio)
+        """The relative noise of most samples."""
+        return median(self.noises)
 
     @cached_property
     def error(self) -> float:
@@ -109,21 +114,51 @@ class ChannelFits:
     @cached_property
     def verdict(self) -> Verdict:
         """How well the recommended fit describes the samples."""
-        return verdict_of(self)
+        return verdict_of(
+            self.samples,
+            self.log_ratio,
+            self.fits,
+            self.recommended,
+            error=self.error,
+            noise=self.noises,
+            weights=self.recommended.weights,
+            checks=self.checks,
+        )
 
     @cached_property
     def checks(self) -> list[Check]:
         """What can be wrong with the measurements, the model, or the numbers."""
-        return checks_of(self)
+        return checks_of(
+            self.samples,
+            self.log_ratio,
+            self.recommended,
+            error=self.error,
+            noise=self.noises,
+            weights=self.recommended.weights,
+            by_incidence=self.by_incidence,
+            freed=self.freed,
+            aperture=self.recommended.options.aperture,
+            left_out=[note for note in self.samples.notes if "left out" in note],
+        )
+
+    @cached_property
+    def freed(self) -> MeasuredFit | None:
+        """The recommended fit with k_s free; None where that means nothing."""
+        fit = self.recommended
+        if fit.fresnel in (None, LOSSLESS) or fit.options.free_specular:
+            return None
+        options = replace(fit.options, fresnel=fit.fresnel, free_specular=True)
+        try:
+            return fit_distribution(_some(self.samples), fit.what, options)
+        except MdfconvError:
+            return None
 
     def records(self) -> list[dict[str, Any]]:
         """Return a record of each fit; verdict and checks are those of the recommended one."""
         checks = [{"name": c.name, "passed": c.passed, "text": c.text} for c in self.checks]
         judged = {"recommended": True, "verdict": self.verdict.grade, "checks": checks}
         other = {"recommended": False, "verdict": None, "checks": None}
-        return [
-            fit.record() | (judged if fit is self.recommended else other) for fit in self.fits
-        ]
+        return [fit.record() | (judged if fit is self.recommended else other) for fit in self.fits]
 
 
 @dataclass(frozen=True)
@@ -274,9 +309,7 @@ def recommended(fits: Sequence[MeasuredFit]) -> MeasuredFit:
     best = ranked(fits)[0]
     limit = best.comparable_error + np.nan_to_num(best.validated_spread)
     good = [fit for fit in fits if fit.comparable_error <= limit]
-    return min(
-        good, key=lambda fit: (fit.size, not fit.distribution.smith, fit.comparable_error)
-    )
+    return min(good, key=lambda fit: (fit.size, not fit.distribution.smith, fit.comparable_error))
 
 
 def fitted_candidates(
@@ -309,11 +342,7 @@ def fitted_candidates(
 
 def _choices(result: ChannelFits) -> list[Choice]:
     """Return the recommended fit under other options, on some of the samples if there are many."""
-    fit, samples = result.recommended, result.samples
-    count = len(samples.values)
-    if count > _MOST_SAMPLES:
-        index = np.random.default_rng(_SEED).choice(count, _MOST_SAMPLES, replace=False)
-        samples = samples.select(np.sort(index))
+    fit, samples = result.recommended, _some(result.samples)
     options = replace(fit.options, fresnel=fit.fresnel or AUTO)
     trials: list[tuple[str, Measurements, Candidate, dict[str, Any]]] = []
     if isinstance(samples, Samples):
@@ -330,19 +359,26 @@ def _choices(result: ChannelFits) -> list[Choice]:
         if fit.fresnel in kinds:
             other = kinds[fit.fresnel]
             trials.append((f"F of a {other}", samples, fit.what, {"fresnel": other}))
-        if not options.free_specular and fit.fresnel != LOSSLESS:
-            trials.append(("k_s free", samples, fit.what, {"free_specular": True}))
     if fit.what.is_double or fit.distribution.name == "ggx":
         other_shape = candidate("ggx" if fit.what.is_double else TWO_LOBES)
         label = "one lobe" if fit.what.is_double else "two lobes"
         trials.append((label, samples, other_shape, {}))
-    choices = []
+    choices = [Choice("k_s free", result.freed)] if result.freed else []
     for label, some, what, changes in trials:
         try:
             choices.append(Choice(label, fit_distribution(some, what, replace(options, **changes))))
         except MdfconvError:
             continue
     return choices
+
+
+def _some(samples: Measurements) -> Measurements:
+    """Return some of the samples if there are many."""
+    count = len(samples.values)
+    if count <= _MOST_SAMPLES:
+        return samples
+    index = np.random.default_rng(_SEED).choice(count, _MOST_SAMPLES, replace=False)
+    return samples.select(np.sort(index))
 
 
 def _restricted(
@@ -386,7 +422,13 @@ def _positive(name: str, samples: Measurements, model: BrdfModel) -> Measurement
 
 
 def _channels(samples: Measurements) -> list[Measurements]:
+    sigma = samples.uncertainty
     return [
-        replace(samples, values=samples.values[:, column : column + 1], channels=(name,))
+        replace(
+            samples,
+            values=samples.values[:, [column]],
+            channels=(name,),
+            uncertainty=None if sigma is None else sigma[:, [column]],
+        )
         for column, name in enumerate(samples.channels)
     ]

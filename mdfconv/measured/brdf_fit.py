@@ -7,7 +7,6 @@ on more of them, and a few steps that of all.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
 from typing import Any
@@ -32,8 +31,8 @@ from mdfconv.measured.model import (
     lobe_at,
 )
 from mdfconv.measured.projection import Projected, Projection, Terms
-from mdfconv.measured.scans import albedo, dependence, scan_order
 from mdfconv.measured.samples import DirectionalSamples, Measurements, Samples
+from mdfconv.measured.scans import albedo, dependence, scan_order
 
 # Samples of a scan for starts, and those on which a start is followed.
 _SCANNED, _FIRST_FITTED = 600, 3_000
@@ -510,9 +509,7 @@ def _mixtures(terms: Terms, coordinates: Array) -> tuple[Terms, Array]:
 class Minimum:
     """A point of a problem, and the best coefficients there."""
 
-    def __init__(
-        self, problem: Problem, point: Array, terms: Terms, projected: Projected
-    ) -> None:
+    def __init__(self, problem: Problem, point: Array, terms: Terms, projected: Projected) -> None:
         self.problem, self.point, self.terms, self.projected = problem, point, terms, projected
         self.cost = float(np.square(projected.residual).sum())
 
@@ -610,9 +607,10 @@ class Minimum:
         spread = self.cost / max(1, residual.size - len(matrix))
         spread *= dependence(residual[:, scan_order(lobe.samples)])
         channels = lobe.samples.channels
+        places = channels if len(channels) > 1 else ("",)
         linear = [
-            f"{_SYMBOLS.get(name, name)} {channel}" if len(channels) > 1 else _SYMBOLS.get(name, name)
-            for channel in channels
+            f"{_SYMBOLS.get(name, name)} {place}".rstrip()
+            for place in places
             for name in lobe.linear
         ]
         names = *(unknown.name for unknown in lobe.unknowns), *linear

@@ -9,8 +9,7 @@ of normals offset + scale · D̄(β).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
@@ -103,7 +102,7 @@ class BrdfModel:
     def deviations(self, samples: Measurements) -> Array | None:
         """Return σ of the values, shape (n, channels); None if neither file nor options say it."""
         if self.noise is None and self.floor is None:
-            return getattr(samples, "uncertainty", None)
+            return samples.uncertainty
         relative, floor = self.noise or 0.0, self.floor or 0.0
         return np.hypot(relative * samples.values, floor)
 
@@ -285,14 +284,14 @@ class Lobe(ABC):
 
     def slopes(self, point: Array, terms: Terms) -> list[Terms]:
         """Return ∂terms/∂coordinate, by differences that stay inside the bounds."""
-        low, high = self.bounds
+        _, high = self.bounds
         slopes = []
         for index in range(len(point)):
             moved = point.copy()
             step = -_DIFFERENCE if point[index] + _DIFFERENCE > high[index] else _DIFFERENCE
             moved[index] += step
-            near = self.terms(moved)
-            slopes.append(Terms((near.basis - terms.basis) / step, (near.fixed - terms.fixed) / step))
+            pairs = zip(self.terms(moved), terms, strict=True)
+            slopes.append(Terms(*((near - here) / step for near, here in pairs)))
         return slopes
 
     @abstractmethod
@@ -333,17 +332,21 @@ class SliceLobe(Lobe):
         self.where = f" at {self.places} angles"
 
     def scanned(self, mdf: Distribution, parameters: Array) -> Terms:
+        """Return terms of many parameters."""
         beta = np.broadcast_to(self.samples.beta, (len(parameters), self.samples.beta.size))
         with np.errstate(all="ignore"):
             return self._with_offset(mdf.shape(beta, parameters[:, None]) / self._foreshortening)
 
     def transform(self) -> Transform | None:
+        """Return the logarithm, if the loss is that."""
         return LOGARITHM if self.options.loss == "log" else None
 
     def weight(self) -> Array:
+        """Return the weights."""
         return np.ones(len(self.samples.values))
 
     def shape(self, point: Array) -> Array:
+        """Return the lobe; of two lobes in units of its value at the normal."""
         value = super().shape(point)
         if not self.what.is_double:
             return value
@@ -404,6 +407,7 @@ class DirectionalLobe(Lobe):
         return (Unknown("n", *_INDEX_RANGE, origin=1.0),) if is_searched else ()
 
     def scanned(self, mdf: Distribution, parameters: Array) -> Terms:
+        """Return terms of many parameters."""
         at = self._at
         beta = np.broadcast_to(at.beta, (len(parameters), at.beta.size))
         with np.errstate(all="ignore"):
@@ -414,6 +418,7 @@ class DirectionalLobe(Lobe):
         return self._averaged(np.stack([np.full_like(lobe, 1 / np.pi), lobe], axis=-2), 0 * lobe)
 
     def transform(self) -> Transform | None:
+        """Return the logarithm or the cube root, if the loss is that."""
         if self.options.deviations(self.samples) is not None:
             return None
         if self.options.loss == "log":
@@ -421,6 +426,7 @@ class DirectionalLobe(Lobe):
         return cube_root(self.samples.outgoing[:, 2]) if self.options.loss == "cube-root" else None
 
     def weight(self) -> Array:
+        """Return the weights."""
         deviations = self.options.deviations(self.samples)
         if deviations is not None:
             return 1 / np.square(deviations.T)

@@ -1,4 +1,4 @@
-"""How samples lie: angles of incidence, scans, and what residuals along them say."""
+"""How samples lie: angles of incidence, scans, neighbours, and what residuals along them say."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ _SAME_ANGLE = 0.5
 _MEDIANS = 1.4826
 # A sample between two neighbours is the least that shows noise.
 _FEWEST = 3
+# Levels of brightness at which noise is estimated, and the least differences of one.
+_LEVELS, _PER_LEVEL = 8, 30
 # Of more samples some are as dense as the lobe needs.
 _MOST = 50_000
 # Of so many neighbours one is opposite to the nearest: on a line, on a grid, and of many clouds.
@@ -79,44 +81,73 @@ def incidence_groups(samples: DirectionalSamples) -> list[tuple[float, Indices]]
 
 
 def estimate_noise(samples: Measurements, log_ratio: Array) -> float:
-    """Return the relative noise of samples: what differs from one to the next.
+    """Return the median of `noise_of`; NaN of too few samples."""
+    return median(noise_of(samples, log_ratio))
+
+
+def median(values: Array) -> float:
+    """Return the median of what is finite; NaN of nothing."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else float("nan")
+
+
+def noise_of(samples: Measurements, log_ratio: Array) -> Array:
+    """Return the relative noise of samples: how much each differs from its neighbours.
 
     The residual of a sample is compared with the one that two neighbours on opposite sides
-    interpolate, so that a misfit, which is smooth, cancels. The median of such differences does
-    not know outliers. The order of the samples does not matter; of more
-    than 50,000 some are drawn.
+    interpolate, so that a misfit, which is smooth, cancels, and medians of such differences do not
+    know outliers. They are taken by brightness, since dark samples are noisier; where bright ones
+    differ more than most, at a peak between two steps, it is not by noise. The order of the samples
+    does not matter; of more than 50,000 some are drawn.
 
     Parameters
     ----------
     samples : Samples or DirectionalSamples
-        The measurements; the surface is taken for isotropic.
+        The measurements, of positive values; the surface is taken for isotropic.
     log_ratio : numpy.ndarray, shape (n, channels)
         ln(fit/data); rows that are not finite are left out.
 
     Returns
     -------
-    float
-        The standard deviation of the noise, relative to the values; NaN of too few samples.
+    numpy.ndarray, shape (n,)
+        The standard deviation of the noise, relative to the value; NaN of too few samples.
     """
     random = np.random.default_rng(_SEED)
-    whole = np.flatnonzero(np.isfinite(log_ratio).all(axis=1))
-    if whole.size < _FEWEST:
-        return float("nan")
-    if whole.size > _MOST:
-        whole = random.choice(whole, _MOST, replace=False)
-    points, residual = _points(samples.select(whole)), log_ratio[whole]
+    unknown = np.full(len(log_ratio), np.nan)
+    rows = np.flatnonzero(np.isfinite(log_ratio).all(axis=1))
+    if rows.size < _FEWEST:
+        return unknown
+    bright = brightness(samples, log_ratio)
+    if rows.size > _MOST:
+        rows = random.choice(rows, _MOST, replace=False)
+    points, residual = _points(samples.select(rows)), log_ratio[rows]
     # By place, whatever the order of the rows.
     place = (points * np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0])[: points.shape[1]]).sum(axis=1)
     order = np.lexsort((residual[:, 0], place))
-    points, residual = points[order], residual[order]
+    points, residual, rows = points[order], residual[order], rows[order]
     # Of many measurements in one place each has neighbours of its own.
     points += 0.1 * _SAME_PLACE * random.standard_normal(points.shape)
     center, near, far, share = _between_neighbours(points)
+    if not center.size:
+        return unknown
     difference = residual[center] - share * residual[near] - (1 - share) * residual[far]
-    spread = np.sqrt(1 + share**2 + (1 - share) ** 2)
-    if not difference.size:
-        return float("nan")
-    return float(_MEDIANS * np.median(np.abs(difference) / spread))
+    apart = np.abs(difference) / np.sqrt(1 + share**2 + (1 - share) ** 2)
+    light = bright[rows[center]]
+    parts = np.array_split(
+        np.argsort(light, kind="stable"), np.clip(light.size // _PER_LEVEL, 1, _LEVELS)
+    )
+    level = np.array([np.median(light[part]) for part in parts])
+    noise = _MEDIANS * np.array([np.median(apart[part]) for part in parts])
+    upper = noise[noise.size // 2 :]
+    np.minimum(upper, np.median(noise), out=upper)
+    # Beyond the darkest level the noise of the detector stays as it is.
+    return np.interp(bright, level, noise) * np.exp(np.maximum(level[0] - bright, 0))
+
+
+def brightness(samples: Measurements, log_ratio: Array) -> Array:
+    """Return the mean logarithm of the fit over the channels, shape (n,)."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.mean(np.log(samples.values) + log_ratio, axis=1)
 
 
 def _points(samples: Measurements) -> Array:

@@ -7,6 +7,7 @@ error of an estimate. What does is how far it moves when an angle of incidence i
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -95,8 +96,7 @@ def _folds(samples: Measurements) -> tuple[list[Indices], bool]:
     groups = [group for _, group in _incidences(samples)]
     if len(groups) > 1:
         ends = np.linspace(0, len(groups), min(len(groups), _MOST_FOLDS) + 1).astype(int)
-        pairs = zip(ends[:-1], ends[1:], strict=True)
-        return [np.concatenate(groups[first:last]) for first, last in pairs], True
+        return [np.concatenate(groups[first:last]) for first, last in pairwise(ends)], True
     order = scan_order(samples)
     block = np.arange(len(order)) * _BLOCKS // len(order)
     return [order[block % _BLOCK_FOLDS == fold] for fold in range(_BLOCK_FOLDS)], False
@@ -132,10 +132,7 @@ def by_incidence(samples: Measurements, fit: MeasuredFit) -> list[IncidenceFit]:
     γ and Fresnel's factor, which one angle does not tell, are those of the fit; the strength of
     the lobe and k_d are free.
     """
-    if fit.what.is_double:
-        what = fit.what
-    else:
-        what = Candidate(fit.distribution)
+    what = fit.what if fit.what.is_double else Candidate(fit.distribution)
     fresnel = LOSSLESS if fit.n is None else f"ior:{fit.n!r}"
     options = replace(fit.options, fresnel=fresnel, free_specular=True)
     alone = []

@@ -11,6 +11,12 @@ from typing import Any
 
 Record = Mapping[str, Any]
 
+# Below it, in units of its first digit, an error has two digits.
+_TWO_DIGITS = 3.55
+# Powers of ten of numbers that people read without one.
+_PLAIN = range(-4, 6)
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 
 def json_text(records: Any) -> str:
     """Return records as indented JSON; NaN and infinities become null."""
@@ -44,18 +50,38 @@ def cell_text(value: Any) -> str:
 
 
 def with_error(value: float, error: float | None) -> str:
-    """Return a number to the digits that its standard error supports, with it: 0.1008 ± 0.0032.
+    """Return a number with its error, as ``0.101 ± 0.004``, and no digits that it does not support.
 
-    The error has two significant digits; without one, or with 0, the number has four.
+    An error has two digits where they are at most 35, and one above (Particle Data Group, Review of
+    Particle Physics, introduction). Without an error above 0 the number has three.
     """
-    if error is None or not 0 < error < math.inf or not math.isfinite(value):
-        return f"{value:.4g}"
-    if error >= abs(value) * 1e6 or error < 1e-12 * abs(value):
-        return f"{value:.4g} ± {error:.2g}"
-    places = 1 - math.floor(math.log10(float(f"{error:.2g}")))
-    if places > 6 or places < -3:
-        return f"{value:.{max(1, places + math.floor(math.log10(abs(value) or error)) + 1)}g} ± {error:.2g}"
-    return f"{round(value, places):.{max(0, places)}f} ± {round(error, places):.{max(0, places)}f}"
+    if not math.isfinite(value):
+        return "—"
+    numbers = [value]
+    if error is not None and math.isfinite(error) and error > 0:
+        numbers.append(error)
+    scale = _magnitude(max(map(abs, numbers)))
+    last = scale - 2
+    if len(numbers) > 1:
+        size = _magnitude(numbers[1])
+        last = size - 1 if numbers[1] < _TWO_DIGITS * 10.0**size else size
+    power = 0 if scale in _PLAIN else scale
+    places = max(power - last, 0)
+    # Adding 0 makes 0 of −0.
+    texts = [f"{round(number, -last) / 10.0**power + 0.0:.{places}f}" for number in numbers]
+    text = " ± ".join(texts).replace("-", "−")
+    if power and len(numbers) > 1:
+        text = f"({text})"
+    return text + (f"·{power_of_ten(power)}" if power else "")
+
+
+def power_of_ten(power: int) -> str:
+    """Return a power of ten for people, as 10⁻⁵."""
+    return f"10{str(power).translate(_RAISED)}"
+
+
+def _magnitude(value: float) -> int:
+    return math.floor(math.log10(value)) if value else 0
 
 
 def rounded_rows(columns: Mapping[str, Any]) -> list[dict[str, float]]:

@@ -60,7 +60,9 @@ def brdf(data, name, parameter, gamma=None, reflectance=None, masking="smith", i
     g = 1.0
     if masking == "smith":
         shape = entry if gamma is None else entry.with_gamma(gamma)
-        g = 1 / (1 + smith(shape, parameter, data.incident) + smith(shape, parameter, data.outgoing))
+        g = 1 / (
+            1 + smith(shape, parameter, data.incident) + smith(shape, parameter, data.outgoing)
+        )
     elif masking != "none":
         g = v_cavity(data, half)
     f = 1.0 if reflectance is None else reflectance + (1 - reflectance) * (1 - cosine) ** 5

@@ -160,7 +160,9 @@ def test_logarithmic_loss_against_curve_fit():
     data = synthetic("gauss")
     noisy = data.values * np.exp(0.02 * rng.normal(size=data.values.shape))
     fit = fit_distribution(
-        Samples(BETA, noisy, ("1",), "ndf"), mdfconv.distribution("gauss"), BrdfModel("log", robust=False)
+        Samples(BETA, noisy, ("1",), "ndf"),
+        mdfconv.distribution("gauss"),
+        BrdfModel("log", robust=False),
     )
 
     def model(beta, m, offset, scale):

@@ -12,7 +12,7 @@ import numpy as np
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.brdf_fit import MeasuredFit, fit_distribution
+from mdfconv.measured.brdf_fit import MeasuredFit, fit_distribution, refitted
 from mdfconv.measured.checks import Check, Verdict, checks_of, verdict_of
 from mdfconv.measured.model import (
     AUTO,
@@ -36,7 +36,7 @@ _HORIZON = 90.0
 _NARROW_LIMIT = 60.0
 # A shape of more parameters whose error is not less by this is the simpler one again.
 _SAME_SHAPE = 0.99
-# Choices are compared on so many samples at most.
+# Candidates, and choices, are compared on so many samples at most.
 _MOST_SAMPLES = 5_000
 _SEED = 2
 
@@ -267,11 +267,15 @@ def fit(
 def _fitted(
     samples: Measurements, candidates: Sequence[Candidate], model: BrdfModel, *, is_asked: bool
 ) -> ChannelFits:
-    """Return the fits of all candidates that the samples are enough for."""
+    """Return the fits of all candidates that the samples are enough for.
+
+    They compete on some of many samples; the recommended one is fitted to all.
+    """
+    some = _some(samples)
     fits, errors = [], []
     for what in candidates:
         try:
-            fits.append(fit_distribution(samples, what, model))
+            fits.append(fit_distribution(some, what, model))
         except MdfconvError as error:
             errors.append(error)
             if is_asked:
@@ -280,8 +284,16 @@ def _fitted(
         raise errors[0]
     if not is_asked:
         fits = distinct(fits)
-    fits = [validated(samples, one) for one in fits]
-    return ChannelFits(samples, ranked(fits), recommended(fits))
+    fits = [validated(some, one) for one in fits]
+    chosen = recommended(fits)
+    if some is not samples:
+        whole = validated(samples, refitted(samples, chosen))
+        # That of the same samples as the others'.
+        errors = {name: getattr(chosen, name) for name in ("validated_error", "validated_spread")}
+        whole = replace(whole, **errors)
+        fits = [whole if one is chosen else one for one in fits]
+        chosen = whole
+    return ChannelFits(samples, ranked(fits), chosen)
 
 
 def distinct(fits: Sequence[MeasuredFit]) -> list[MeasuredFit]:

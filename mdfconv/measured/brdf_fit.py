@@ -54,7 +54,7 @@ _LEAST_ERROR = 1e-150
 # Of the largest value: what is smaller has no weight 1/value² in double precision.
 _SMALLEST_LOGARITHM = 1e-100
 _STEPS, _FIRST_STEPS, _POLISHING_STEPS = 60, 8, 4
-_SMALLEST_STEP = 1e-8
+_SMALLEST_STEP = 1e-6
 _DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-4, 1e-12, 1e8
 # Of the choice of samples: the same fit each time.
 _SEED = 0
@@ -343,6 +343,12 @@ def fit_distribution(
     return found.report()
 
 
+def refitted(samples: Measurements, fit: MeasuredFit) -> MeasuredFit:
+    """Return the fit to more samples of the same surface, near which it is."""
+    problem = Problem(lobe_at(samples, fit.what, fit.options, fit.fresnel or LOSSLESS))
+    return _robust(problem.evaluated(fit.point), passes=_LAST_PASSES).report()
+
+
 def _some(random: np.random.Generator, count: int, most: int) -> Indices | None:
     """Return the indices of some samples, in order; None for all."""
     return np.sort(random.choice(count, most, replace=False)) if count > most else None
@@ -361,12 +367,13 @@ def _robust(minimum: Minimum, passes: int) -> Minimum:
 class Problem:
     """The projected problem: residuals of the best coefficients, by the point of a lobe."""
 
-    def __init__(self, lobe: Lobe, robust: Array | None = None) -> None:
+    def __init__(self, lobe: Lobe, robust: Array | None = None, unit: float | None = None) -> None:
         self.lobe = lobe
         values = np.ascontiguousarray(lobe.samples.values.T)
         self._check(values)
         # Of one angle in units of the largest value, whatever the measurement's; a BRDF has one.
-        self.unit = float(np.max(np.abs(values))) if isinstance(lobe, SliceLobe) else 1.0
+        largest = float(np.max(np.abs(values))) if isinstance(lobe, SliceLobe) else 1.0
+        self.unit = largest if unit is None else unit
         self._values = values / self.unit
         self.robust = np.ones(values.shape[1]) if robust is None else robust
         self._transform = lobe.transform()
@@ -399,13 +406,15 @@ class Problem:
 
     def part(self, index: Any) -> Problem:
         """Return the problem of some of the samples; itself for None."""
-        return self if index is None else Problem(self.lobe.part(index), self.robust[index])
+        if index is None:
+            return self
+        return Problem(self.lobe.part(index), self.robust[index], self.unit)
 
     def with_fresnel(self, fresnel: str) -> Problem:
         """Return the problem with another Fresnel factor."""
         if fresnel == self.lobe.fresnel:
             return self
-        return Problem(self.lobe.with_fresnel(fresnel), self.robust)
+        return Problem(self.lobe.with_fresnel(fresnel), self.robust, self.unit)
 
     def reweighted(self, minimum: Minimum) -> Problem:
         """Return the problem in which what is far off at a point counts less."""
@@ -413,7 +422,8 @@ class Problem:
             return self
         residual = np.abs(minimum.projected.residual).max(axis=0) / np.sqrt(minimum.problem.robust)
         spread = _MEDIANS * float(np.median(residual)) or 1.0
-        return Problem(self.lobe, np.minimum(1, _HUBER * spread / np.maximum(residual, 1e-300)))
+        weights = np.minimum(1, _HUBER * spread / np.maximum(residual, 1e-300))
+        return Problem(self.lobe, weights, self.unit)
 
     def starts(self) -> list[Array]:
         """Return the best point of each γ of a grid, the best ones first; raise if none is."""
@@ -471,7 +481,8 @@ class Problem:
         for _ in range(steps):
             slopes = self.lobe.slopes(now.point, now.terms)
             jacobian = projection.projected_slope(now.terms, slopes, now.projected)
-            normal, right = jacobian.T @ jacobian, jacobian.T @ now.projected.residual.ravel()
+            normal = np.einsum("in,jn->ij", jacobian, jacobian)
+            right = np.einsum("in,n->i", jacobian, now.projected.residual.ravel())
             # At an end of its range a coordinate may only come back.
             held = ((now.point <= low) & (right > 0)) | ((now.point >= high) & (right < 0))
             free = np.flatnonzero(~held & (np.diagonal(normal) > 0))
@@ -514,10 +525,16 @@ class Minimum:
         self.cost = float(np.square(projected.residual).sum())
 
     @property
-    def error(self) -> float:
-        """The root mean square residual, weighted by the robust weights, in the loss's units."""
+    def relative_error(self) -> float:
+        """The root mean square residual, weighted by the robust weights, in the problem's unit."""
         weight = self.problem.robust.sum() * len(self.projected.coefficients)
         return float(np.sqrt(self.cost / weight))
+
+    @property
+    def error(self) -> float:
+        """The same in the loss's units."""
+        is_relative = self.problem.lobe.transform() is not None
+        return self.relative_error * (1 if is_relative else self.problem.unit)
 
     @property
     def is_plausible(self) -> bool:
@@ -531,7 +548,7 @@ class Minimum:
         """Return Schwarz's criterion for so many samples."""
         size = count * len(self.projected.coefficients)
         unknowns = len(self.point) + self.projected.coefficients.size
-        return size * np.log(max(self.error, _LEAST_ERROR) ** 2) + unknowns * np.log(size)
+        return size * np.log(max(self.relative_error, _LEAST_ERROR) ** 2) + unknowns * np.log(size)
 
     def estimates(self) -> tuple[dict[str, float], dict[str, tuple[float, ...]]]:
         """Return what was searched and what was solved for, by their names."""
@@ -582,7 +599,7 @@ class Minimum:
             linear_errors={name: tuple(all_.tolist()) for name, all_ in deviation.items()},
             options=lobe.options,
             fresnel=None if isinstance(lobe, SliceLobe) else lobe.fresnel,
-            error=unit * self.error,
+            error=self.error,
             rmse=_rmse(near, values),
             log_rmse=_log_rmse(near, values),
             bic=float(self.bic(self.problem.count) + 2 * size * np.log(unit)),

@@ -51,8 +51,9 @@ class Terms(NamedTuple):
 
     def at(self, coefficients: Array) -> Array:
         """Return the model, shape (..., channels, n), of coefficients (..., channels, k)."""
-        value: Array = coefficients @ self.basis
-        value += self.fixed[..., None, :]
+        value = self.fixed[..., None, :]
+        for place in range(self.basis.shape[-2]):
+            value = value + coefficients[..., place, None] * self.basis[..., None, place, :]
         return value
 
 
@@ -125,8 +126,10 @@ def nonnegative(terms: Terms, values: Array, weight: Array) -> Array:
     """
     basis = terms.basis
     weighted = basis[..., None, :, :] * (weight if weight.ndim < 2 else weight[..., :, None, :])
-    normal = weighted @ basis.swapaxes(-1, -2)[..., None, :, :]
-    right = (weighted @ (values - terms.fixed[..., None, :])[..., None])[..., 0]
+    # Of so few rows faster than a product of matrices, whose threads wait for each other.
+    normal = np.einsum("...in,...jn->...ij", weighted, basis[..., None, :, :])
+    wanted = values - terms.fixed[..., None, :]
+    right = np.einsum("...n,...n->...", weighted, wanted[..., None, :])
     # In units in which the diagonal is 1.
     size = np.sqrt(np.maximum(normal.diagonal(axis1=-2, axis2=-1), np.finfo(float).tiny))
     right /= size
@@ -176,32 +179,27 @@ def _solved(normal: Array, right: Array) -> Array:
 def projected_slope(terms: Terms, slopes: list[Terms], projected: Projected) -> Array:
     """Return ∂residual/∂parameter with the linear part projected out (Kaufman 1975).
 
-    The result has shape (channels · n, parameters). Coefficients that are zero stay so.
+    The result has shape (parameters, channels · n). Coefficients that are zero stay so.
     """
-    columns = []
-    for moved in moved_models(slopes, projected):
-        for channel, column in enumerate(moved):
-            free = terms.basis[projected.coefficients[channel] > 0] * projected.gain[channel]
-            column *= projected.gain[channel]
-            if len(free):
-                column -= _least_squares(free, column) @ free
-        columns.append(moved.ravel())
-    return np.stack(columns, axis=1)
+    moved = np.stack(moved_models(slopes, projected))
+    moved *= projected.gain
+    for channel, gain in enumerate(projected.gain):
+        free = terms.basis[projected.coefficients[channel] > 0] * gain
+        size = np.sqrt(np.einsum("in,in->i", free, free))
+        free /= np.where(size > 0, size, 1)[:, None]
+        normal = np.einsum("in,jn->ij", free, free)
+        shares = np.einsum("pn,in->pi", moved[:, channel], free)
+        if len(free):
+            with np.errstate(all="ignore"):
+                shares = np.nan_to_num(_solved(normal, shares), posinf=0, neginf=0)
+        for place, row in enumerate(free):
+            moved[:, channel] -= shares[:, place, None] * row
+    return moved.reshape(len(moved), -1)
 
 
 def moved_models(slopes: list[Terms], projected: Projected) -> list[Array]:
     """Return ∂model/∂parameter at fixed coefficients, each of shape (channels, n)."""
     return [slope.at(projected.coefficients) for slope in slopes]
-
-
-def _least_squares(rows: Array, column: Array) -> Array:
-    """Return the multiples of a few long rows nearest to a column."""
-    size = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    size = np.where(size > 0, size, 1)
-    normal = (rows @ rows.T) / (size[:, None] * size)
-    with np.errstate(all="ignore"):
-        multiples = _solved(normal, (rows @ column) / size) / size
-    return np.nan_to_num(multiples, posinf=0, neginf=0)
 
 
 def information(terms: Terms, slopes: list[Terms], projected: Projected) -> Array:
@@ -214,5 +212,5 @@ def information(terms: Terms, slopes: list[Terms], projected: Projected) -> Arra
         rows = np.stack([*(model[channel] for model in moved), *terms.basis]) * gain
         first = count + size * channel
         places = np.concatenate([np.arange(count), np.arange(first, first + size)])
-        total[np.ix_(places, places)] += rows @ rows.T
+        total[np.ix_(places, places)] += np.einsum("in,jn->ij", rows, rows)
     return total

@@ -177,6 +177,7 @@ def test_a_bare_angle_is_that_of_the_half_vector_if_values_fall_off(tmp_path):
     assert isinstance(read(path), Samples)
     half = read(write(tmp_path, ONE), ReadOptions(angle_is="half"))
     np.testing.assert_allclose(half.beta, np.radians(SCAN[80:]))
+    assert len(set(half.notes)) == len(half.notes)
     # An outlier is no lobe, and so is what begins at its peak.
     values = np.exp(-SCAN[80:] / 10)
     values[[40, 60]] = 5

@@ -121,19 +121,22 @@ class _Columns:
             reason = f"{table.listed([column])} holds the angle of the half vector"
             raise table.error(reason, "it has no angle of incidence")
         data, unit = self._values([column]), self._unit_of_angles([column])
-        notes = (*self._notes, *data.notes)
+        # The column may have been looked for twice.
+        notes = (*dict.fromkeys(self._notes), *data.notes)
         if not is_half:
             other = "" if options.angle_is else ", not of a direction"
             read = f"{table.listed([column])} is read as the angle between normal and half vector"
             notes += (read + other,)
         angle = data.angles[column]
         is_assumed = not (is_half or options.angle_is)
-        if is_assumed and (angle < -1e-6).any():
-            reason = f"{unit} {np.nanmin(angle):g} is outside 0 to {UNITS[unit].largest:.6g}, "
-            reason += "an angle from the normal to the horizon"
-            raise table.error(reason, _GIVE_INCIDENCE, argument="incidence")
         what = data.values, data.channels, "ndf", notes, table.about, data.uncertainty
-        result = samples.samples(table.path, angle, unit, *what)
+        try:
+            result = samples.samples(table.path, angle, unit, *what)
+        except MdfconvError as error:
+            negative = np.isfinite(angle) & (angle < 0)
+            if not (is_assumed and negative.any()):
+                raise
+            raise MdfconvError(error.reason, _GIVE_INCIDENCE, argument="incidence") from None
         peak = _peak_off_normal(result) if is_assumed else None
         if peak is not None:
             reason = f"{table.listed([column])} is no angle of half vectors: there is no lobe to "

@@ -32,6 +32,8 @@ _GOOD_NOISE = 0.1
 # The share of the error that two lobes, or a free k_s, have to save before they are spoken of; and
 # the ratio of two lobes that are a core and tails.
 _GAIN, _TAILS = 0.2, 3.0
+# A free k_s gains nothing if so much of the error is left, and little if it explains less error.
+_NO_GAIN, _SMALL_GAIN = 0.95, 0.03
 # Where residuals are looked at, in degrees: of angles, and of distances from the mirror direction.
 _ANGLE_STEPS = np.arange(5.0, 90.0, 5.0)
 _MIRROR_STEPS = np.array([1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0])
@@ -151,13 +153,16 @@ def verdict_of(
     # Dark samples may have much noise, which excuses residuals, but bright ones may not.
     bright = brightness(samples, log_ratio)
     known = np.isfinite(log_ratio).all(axis=1)
+    weights = np.where(known, weights, 0)
     square = np.where(known, np.mean(np.square(log_ratio), axis=1), 0)
     misfit = error
     if median(noise[bright >= median(bright)]) <= _GOOD_NOISE:
         square = np.where(known, np.maximum(square - np.square(2 * noise), 0), 0)
         misfit = min(error, float(np.sqrt(np.average(square, weights=weights))))
+    if misfit > _GOOD or fit.second is not None:
+        reasons.append(_two_lobes(fits, fit, error))
     if misfit > _GOOD:
-        reasons += [_two_lobes(fits, fit, error), failed.get("incidences", "")]
+        reasons.append(failed.get("incidences", ""))
     if error > _GOOD and misfit < 0.5 * error:
         reasons.append(f"Most of it is noise of dark samples; {_percent(misfit)} is left beyond.")
     if misfit > _WORTH_A_WORD:
@@ -165,15 +170,14 @@ def verdict_of(
     typical = median(noise)
     size = f"{_percent(error)} ({len(samples.values)} samples"
     size += f", noise {_percent(typical)})" if np.isfinite(typical) else ")"
+    described = f"{_described(fit)} with an RMS error of {size}"
     if misfit <= _USABLE:
         grade = "good" if misfit <= _GOOD and not reasons[0] else "usable"
-        start = f"{_surface(fit)}, described by {fit.label} with an RMS error of {size}."
+        start = f"{_surface(fit)}, described by {described}."
     else:
         grade = "poor"
         what = "this surface" if isinstance(samples, DirectionalSamples) else "these values"
-        start = f"No single lobe describes {what}: {fit.label} has an RMS error of {size}."
-        if fit.second is not None:
-            start = f"Two lobes do not describe {what}: their RMS error is {size}."
+        start = f"No single lobe describes {what}: at best {described}."
     return Verdict(grade, " ".join([start, *list(filter(None, reasons))[:_MOST_REASONS]]))
 
 
@@ -205,22 +209,31 @@ def _is_colored(values: Sequence[float]) -> bool:
     return bool(np.ptp(values) > _COLOR * np.mean(values))
 
 
+def _described(fit: MeasuredFit) -> str:
+    """Return what a fit is called; of two lobes also how they differ."""
+    if fit.second is None or fit.share is None:
+        return fit.label
+    shape = ", a narrow core with long tails" if fit.second > _TAILS * fit.parameter else ""
+    symbol, share = fit.distribution.parameter.symbol, 100 * fit.share
+    lobes = f"{symbol} = {fit.parameter:.2g} and {fit.second:.2g}, {share:.0f}:{100 - share:.0f}"
+    return f"{fit.label}{shape} ({lobes}),"
+
+
 def _two_lobes(fits: Sequence[MeasuredFit], fit: MeasuredFit, error: float) -> str:
-    """Return what two lobes would gain; "" if that is little."""
-    double = min((f for f in fits if f.second is not None), key=lambda f: f.error, default=None)
-    if double is None or fit.second is not None or double.error > (1 - _GAIN) * fit.error:
+    """Return what two lobes gain over the best single one; "" if that is little."""
+    singles = [one for one in fits if one.second is None]
+    doubles = [one for one in fits if one.second is not None]
+    if not singles or not doubles:
         return ""
-    assert double.second is not None
-    assert double.share is not None
-    (narrow, share), (wide, _) = sorted(
-        [(double.parameter, double.share), (double.second, 1 - double.share)]
-    )
-    shape = "A narrow core with long tails: " if wide > _TAILS * narrow else ""
-    gain = double.error / fit.error
+    single, double = (min(group, key=lambda one: one.error) for group in (singles, doubles))
+    single = single if fit.second is not None else fit
+    gain = double.error / single.error
+    if gain > 1 - _GAIN:
+        return ""
+    if fit.second is not None:
+        return f"The best single lobe, {single.label}, leaves {_percent(error / gain)}."
     verb = "halve" if 0.4 <= gain <= 0.6 else "reduce"
-    symbol = double.distribution.parameter.symbol
-    numbers = f"{symbol} = {narrow:.2g} and {wide:.2g}, {100 * share:.0f}:{100 * (1 - share):.0f}"
-    text = f"{shape}{double.label} ({numbers}) {verb} the error to {_percent(gain * error)}."
+    text = f"{_described(double)} would {verb} the error to {_percent(gain * error)}."
     return text[0].upper() + text[1:]
 
 
@@ -525,12 +538,11 @@ def _strength(fit: MeasuredFit, freed: MeasuredFit | None, error: float) -> Chec
         return None
     gain = freed.error / fit.error
     text = f"Freeing k_s (then {', '.join(f'{value:.2g}' for value in freed.specular)}) would "
-    if gain > 1 - _GAIN:
-        rest = (
-            f"reduce the error to {_percent(gain * error)} only" if gain < 0.95 else "gain nothing"
-        )
-        return Check("strength", True, f"{text}{rest}.")
+    if gain > _NO_GAIN:
+        return Check("strength", True, f"{text}gain nothing.")
     text += f"reduce the error from {_percent(error)} to {_percent(gain * error)}"
+    if gain > 1 - _GAIN or error * np.sqrt(1 - gain**2) < _SMALL_GAIN:
+        return Check("strength", True, f"{text} only.")
     if np.allclose(freed.specular, np.pi, rtol=_NEAR_PI):
         text += ". k_s is near π: are these reflectance factors, π f_r?"
         return Check("strength", False, text, argument="values_are")

@@ -177,7 +177,9 @@ def verdict_of(
     else:
         grade = "poor"
         what = "this surface" if isinstance(samples, DirectionalSamples) else "these values"
-        start = f"No single lobe describes {what}: at best {described}."
+        start = f"No single lobe describes {what}: {described}."
+        if fit.second is not None:
+            start = f"Not even two lobes describe {what}: {described}."
     return Verdict(grade, " ".join([start, *list(filter(None, reasons))[:_MOST_REASONS]]))
 
 
@@ -210,9 +212,9 @@ def _is_colored(values: Sequence[float]) -> bool:
 
 
 def _described(fit: MeasuredFit) -> str:
-    """Return what a fit is called; of two lobes also how they differ."""
+    """Return what a fit is called, with its γ, or how two lobes differ."""
     if fit.second is None or fit.share is None:
-        return fit.label
+        return fit.label if fit.gamma is None else f"{fit.label} (γ = {fit.gamma:.3g})"
     shape = ", a narrow core with long tails" if fit.second > _TAILS * fit.parameter else ""
     symbol, share = fit.distribution.parameter.symbol, 100 * fit.share
     lobes = f"{symbol} = {fit.parameter:.2g} and {fit.second:.2g}, {share:.0f}:{100 - share:.0f}"
@@ -250,7 +252,7 @@ def _where_it_fails(samples: Measurements, square: Array) -> str:
         below = np.bincount(place, minlength=steps.size + 1)[:-1].cumsum()
         squares = np.bincount(place, square, minlength=steps.size + 1)[:-1].cumsum()
         sides = (below, squares), (count - below, total - squares)
-        for name, (inside, part) in zip(names, sides, strict=True):
+        for name, (inside, part), is_below in zip(names, sides, (True, False), strict=True):
             mean = part / np.maximum(inside, 1)
             others = (total - part) / np.maximum(count - inside, 1)
             is_part = (inside >= max(3, _PART[0] * count)) & (inside <= _PART[1] * count)
@@ -258,7 +260,11 @@ def _where_it_fails(samples: Measurements, square: Array) -> str:
             split = inside * (count - inside) * np.square(mean - others)
             split = np.where(is_part & is_large, split, 0)
             index = int(np.argmax(split))
-            if split[index] > best:
+            if split[index] <= best:
+                continue
+            is_inside = (place <= index) == is_below
+            # Not an outlier or two.
+            if np.median(square[is_inside]) > np.median(square[~is_inside]):
                 best, size = split[index], _percent(np.sqrt(mean[index]))
                 where = f"The misfit is largest {name.format(steps[index])}: {size}."
     return where

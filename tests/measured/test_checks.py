@@ -222,6 +222,7 @@ class Scan:
             "label": "GGX",
             "parameter": 0.3,
             "second": None,
+            "gamma": None,
             "fresnel": "metal",
             "n": None,
             "f0": (0.9,),
@@ -298,6 +299,24 @@ def test_a_verdict_says_where_the_misfit_is(misfit, where):
     assert "30 %" in verdict.sentence or "29 %" in verdict.sentence
 
 
+def test_outliers_are_no_place():
+    scan = Scan(noise=0.02)
+    angles = in_plane(1.0)
+    peak = np.flatnonzero(np.abs(angles[:, 2] - angles[:, 0]) + (angles[:, 3] < 90) <= 2)
+    scan.log_ratio[peak[::4]] = 1.1
+    scan.weights[peak[::4]] = 0.03
+    assert "largest" not in scan.verdict(error=0.06).sentence
+
+
+def test_outliers_are_no_place():
+    scan = Scan(noise=0.02)
+    angles = in_plane(1.0)
+    peak = np.flatnonzero(np.abs(angles[:, 2] - angles[:, 0]) + (angles[:, 3] < 90) <= 2)
+    scan.log_ratio[peak[::4]] = 1.1
+    scan.weights[peak[::4]] = 0.03
+    assert "largest" not in scan.verdict(error=0.06).sentence
+
+
 def test_a_misfit_everywhere_is_nowhere_largest():
     scan = Scan(lambda i, p, o, q: 0.1 * np.sign(np.sin(o + i)), 0.01)
     assert "largest" not in scan.verdict().sentence
@@ -313,7 +332,7 @@ def two_lobes(error):
 def test_a_surface_that_needs_two_lobes():
     scan = Scan(lambda i, p, o, q: 0.6 * np.sin(np.radians(3 * o)))
     sentence = scan.verdict([two_lobes(0.5 * scan.error)]).sentence
-    assert sentence.startswith("No single lobe describes this surface: at best GGX with an RMS ")
+    assert sentence.startswith("No single lobe describes this surface: GGX with an RMS error ")
     lobes = "Two GGX lobes, a narrow core with long tails (α = 0.014 and 0.21, 75:25), would halve"
     assert lobes in sentence
     assert "two GGX" not in scan.verdict([two_lobes(0.9 * scan.error)]).sentence.lower()

@@ -186,6 +186,8 @@ def verdict_of(
 def _percent(share: float) -> str:
     """Return a share in %, with two digits and of large ones all before the point."""
     number = 100 * share
+    if 0 < number < 0.01:
+        return "less than 0.01 %"
     return f"{number:.0f} %" if number >= 9.95 else f"{number:.2g} %"
 
 
@@ -442,10 +444,10 @@ def _resolution(
         width = np.fmin(width, 2 * half) if error > _USABLE else width
     else:
         angle, width = "β", 2 * half_width
-        step = np.degrees(np.min(np.diff(np.unique(samples.beta)), initial=np.inf))
+        step = np.degrees(np.min(np.diff(np.unique(samples.beta))[:1], initial=np.inf))
     if not (np.isfinite(width) and np.isfinite(step)):
         return None
-    sizes = f"{width:.2g}° wide in {angle} at half its height, the step {step:.2g}°"
+    sizes = f"{width:.3g}° wide in {angle} at half its height, the step {step:.2g}°"
     passed = width >= _LEAST_STEPS * step
     if aperture:
         sizes += f", the aperture {aperture:.2g}°"
@@ -547,12 +549,17 @@ def _strength(fit: MeasuredFit, freed: MeasuredFit | None, error: float) -> Chec
     if gain > _NO_GAIN:
         return Check("strength", True, f"{text}gain nothing.")
     text += f"reduce the error from {_percent(error)} to {_percent(gain * error)}"
-    if gain > 1 - _GAIN or error * np.sqrt(1 - gain**2) < _SMALL_GAIN:
-        return Check("strength", True, f"{text} only.")
-    if np.allclose(freed.specular, np.pi, rtol=_NEAR_PI):
+    is_little = gain > 1 - _GAIN or error * np.sqrt(1 - gain**2) < _SMALL_GAIN
+    if not is_little and np.allclose(freed.specular, np.pi, rtol=_NEAR_PI):
         text += ". k_s is near π: are these reflectance factors, π f_r?"
         return Check("strength", False, text, argument="values_are")
-    return Check("strength", False, f"{text}: the model, not the calibration, is in doubt.")
+    if is_little or error <= _GOOD:
+        return Check("strength", True, f"{text} only.")
+    if freed.f0 is not None and np.mean(freed.f0) > 1:
+        text += ": F does not rise to 1 towards grazing as the model's does"
+    else:
+        text += ": the model, not the calibration, is in doubt"
+    return Check("strength", False, f"{text}.")
 
 
 def _outliers(weights: Array, is_beyond_noise: NDArray[np.bool_]) -> Check:

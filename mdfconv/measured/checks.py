@@ -60,8 +60,8 @@ _ALBEDO_ANGLES = (0.0, 45.0, 75.0)
 _LEAST_STEPS, _LEAST_APERTURES = 4.0, 3.0
 # One parameter stands for all angles of incidence if those of each differ no more.
 _DRIFT = 0.2
-# Steps of less than this share of the whole do not turn a trend around.
-_FLAT = 0.1
+# It rises or falls if so much of the difference is that of the first and the last.
+_TREND = 0.8
 _CORRELATED = 0.95
 # Incidences from here on tell mirror direction and light apart, degrees.
 _OBLIQUE = 15.0
@@ -149,16 +149,9 @@ def verdict_of(
         What `checks_of` found: more light than falls on a surface is never good.
     """
     failed = {check.name: check.text for check in checks if check.passed is False}
+    square = _misfit(samples, log_ratio, noise, weights)
+    misfit = min(error, float(np.sqrt(square.sum() / weights.sum())))
     reasons = [failed.get("energy", "")]
-    # Dark samples may have much noise, which excuses residuals, but bright ones may not.
-    bright = brightness(samples, log_ratio)
-    known = np.isfinite(log_ratio).all(axis=1)
-    weights = np.where(known, weights, 0)
-    square = np.where(known, np.mean(np.square(log_ratio), axis=1), 0)
-    misfit = error
-    if median(noise[bright >= median(bright)]) <= _GOOD_NOISE:
-        square = np.where(known, np.maximum(square - np.square(2 * noise), 0), 0)
-        misfit = min(error, float(np.sqrt(np.average(square, weights=weights))))
     if misfit > _GOOD or fit.second is not None:
         reasons.append(_two_lobes(fits, fit, error))
     if misfit > _GOOD:
@@ -166,21 +159,33 @@ def verdict_of(
     if error > _GOOD and misfit < 0.5 * error:
         reasons.append(f"Most of it is noise of dark samples; {_percent(misfit)} is left beyond.")
     if misfit > _WORTH_A_WORD:
-        reasons.append(_where_it_fails(samples, weights * square))
+        reasons.append(_where_it_fails(samples, square))
     typical = median(noise)
-    size = f"{_percent(error)} ({len(samples.values)} samples"
+    size = f"an RMS error of {_percent(error)} ({len(samples.values)} samples"
     size += f", noise {_percent(typical)})" if np.isfinite(typical) else ")"
-    described = f"{_described(fit)} with an RMS error of {size}"
+    lobe, is_single = _described(fit), fit.second is None
     if misfit <= _USABLE:
         grade = "good" if misfit <= _GOOD and not reasons[0] else "usable"
-        start = f"{_surface(fit)}, described by {described}."
+        start = f"{_surface(fit)}, described by {lobe} with {size}."
     else:
         grade = "poor"
         what = "this surface" if isinstance(samples, DirectionalSamples) else "these values"
-        start = f"No single lobe describes {what}: {described}."
-        if fit.second is not None:
-            start = f"Not even two lobes describe {what}: {described}."
+        start = f"{'No single lobe describes' if is_single else 'Two lobes do not describe'} {what}"
+        start += f": {lobe} {'leaves' if is_single else 'leave'} {size}."
     return Verdict(grade, " ".join([start, *list(filter(None, reasons))[:_MOST_REASONS]]))
+
+
+def _misfit(samples: Measurements, log_ratio: Array, noise: Array, weights: Array) -> Array:
+    """Return the weighted squares of what the fit leaves beyond twice the noise, shape (n,).
+
+    Dark samples may have much noise, which excuses residuals; bright ones may not.
+    """
+    known = np.isfinite(log_ratio).all(axis=1)
+    square = np.mean(np.square(log_ratio), axis=1)
+    bright = brightness(samples, log_ratio)
+    if median(noise[bright >= median(bright)]) <= _GOOD_NOISE:
+        square = np.maximum(square - np.square(2 * noise), 0)
+    return np.where(known, weights * square, 0)
 
 
 def _percent(share: float) -> str:
@@ -447,15 +452,19 @@ def _resolution(
         step = np.degrees(np.min(np.diff(np.unique(samples.beta))[:1], initial=np.inf))
     if not (np.isfinite(width) and np.isfinite(step)):
         return None
-    sizes = f"{width:.3g}° wide in {angle} at half its height, the step {step:.2g}°"
+    sizes = f"{_degrees(width)} wide in {angle} at half its height, the step {_degrees(step)}"
     passed = width >= _LEAST_STEPS * step
     if aperture:
-        sizes += f", the aperture {aperture:.2g}°"
+        sizes += f", the aperture {aperture:g}°"
         passed &= width >= _LEAST_APERTURES * aperture
     if passed:
         return Check("resolution", True, f"The lobe is {sizes}.")
     text = f"The lobe is at most {sizes}: its peak is not resolved, the roughness is uncertain."
     return Check("resolution", False, text)
+
+
+def _degrees(angle: float) -> str:
+    return f"{angle:.0f}°" if angle >= 9.5 else f"{angle:.2g}°"
 
 
 def _peak(samples: DirectionalSamples) -> tuple[float, float]:
@@ -488,13 +497,10 @@ def _one_parameter(fit: MeasuredFit, by_incidence: Sequence[IncidenceFit]) -> Ch
     uncertain = 2 * np.hypot(low.parameter_error, high.parameter_error)
     alpha = fit.distribution.peak_alpha(parameter)
     drifts = np.ptp(parameter) > uncertain and np.ptp(alpha) > _DRIFT * np.median(alpha)
-    steps = np.diff(parameter)
-    steps = steps[np.abs(steps) > max(uncertain, _FLAT * np.ptp(parameter))]
     first, last = known[0], known[-1]
-    if drifts and last is high and (steps > 0).all():
-        text = f"rises from {_at(first)} to {_at(last)}"
-    elif drifts and last is low and (steps < 0).all():
-        text = f"falls from {_at(first)} to {_at(last)}"
+    change = last.parameter - first.parameter
+    if drifts and abs(change) >= _TREND * np.ptp(parameter):
+        text = f"{'rises' if change > 0 else 'falls'} from {_at(first)} to {_at(last)}"
     else:
         text = f"is between {_at(low)} and {_at(high)}"
     text = f"By angle of incidence {fit.distribution.parameter.symbol} {text}"

@@ -323,7 +323,7 @@ def two_lobes(error):
 def test_a_surface_that_needs_two_lobes():
     scan = Scan(lambda i, p, o, q: 0.6 * np.sin(np.radians(3 * o)))
     sentence = scan.verdict([two_lobes(0.5 * scan.error)]).sentence
-    assert sentence.startswith("No single lobe describes this surface: GGX with an RMS error ")
+    assert sentence.startswith("No single lobe describes this surface: GGX leaves an RMS error ")
     lobes = "Two GGX lobes, a narrow core with long tails (α = 0.014 and 0.21, 75:25), would halve"
     assert lobes in sentence
     assert "two GGX" not in scan.verdict([two_lobes(0.9 * scan.error)]).sentence.lower()

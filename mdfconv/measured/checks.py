@@ -151,7 +151,7 @@ def verdict_of(
     failed = {check.name: check.text for check in checks if check.passed is False}
     square = _misfit(samples, log_ratio, noise, weights)
     misfit = min(error, float(np.sqrt(square.sum() / weights.sum())))
-    reasons = [failed.get("energy", "")]
+    reasons = ["More light leaves it than falls on it." if "energy" in failed else ""]
     if misfit > _GOOD or fit.second is not None:
         reasons.append(_two_lobes(fits, fit, error))
     if misfit > _GOOD:

@@ -366,7 +366,7 @@ def test_more_light_than_falls_on_a_surface_is_asked_for_its_unit():
     assert check.argument == "values_are"
     verdict = scan.verdict(checks=[check])
     assert verdict.grade == "usable"
-    assert check.text in verdict.sentence
+    assert "More light leaves it than falls on it." in verdict.sentence
 
 
 def test_a_little_more_light_is_a_matter_of_calibration():

@@ -32,6 +32,8 @@ _GOOD_NOISE = 0.1
 # The share of the error that two lobes, or a free k_s, have to save before they are spoken of; and
 # the ratio of two lobes that are a core and tails.
 _GAIN, _TAILS = 0.2, 3.0
+# A free k_s gains nothing if so much of the error is left, and little if it explains less error.
+_NO_GAIN, _SMALL_GAIN = 0.95, 0.03
 # Where residuals are looked at, in degrees: of angles, and of distances from the mirror direction.
 _ANGLE_STEPS = np.arange(5.0, 90.0, 5.0)
 _MIRROR_STEPS = np.array([1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0])
@@ -58,8 +60,8 @@ _ALBEDO_ANGLES = (0.0, 45.0, 75.0)
 _LEAST_STEPS, _LEAST_APERTURES = 4.0, 3.0
 # One parameter stands for all angles of incidence if those of each differ no more.
 _DRIFT = 0.2
-# Steps of less than this share of the whole do not turn a trend around.
-_FLAT = 0.1
+# It rises or falls if so much of the difference is that of the first and the last.
+_TREND = 0.8
 _CORRELATED = 0.95
 # Incidences from here on tell mirror direction and light apart, degrees.
 _OBLIQUE = 15.0
@@ -147,39 +149,50 @@ def verdict_of(
         What `checks_of` found: more light than falls on a surface is never good.
     """
     failed = {check.name: check.text for check in checks if check.passed is False}
-    reasons = [failed.get("energy", "")]
-    # Dark samples may have much noise, which excuses residuals, but bright ones may not.
-    bright = brightness(samples, log_ratio)
-    known = np.isfinite(log_ratio).all(axis=1)
-    square = np.where(known, np.mean(np.square(log_ratio), axis=1), 0)
-    misfit = error
-    if median(noise[bright >= median(bright)]) <= _GOOD_NOISE:
-        square = np.where(known, np.maximum(square - np.square(2 * noise), 0), 0)
-        misfit = min(error, float(np.sqrt(np.average(square, weights=weights))))
+    square = _misfit(samples, log_ratio, noise, weights)
+    misfit = min(error, float(np.sqrt(square.sum() / weights.sum())))
+    reasons = ["More light leaves it than falls on it." if "energy" in failed else ""]
+    if misfit > _GOOD or fit.second is not None:
+        reasons.append(_two_lobes(fits, fit, error))
     if misfit > _GOOD:
-        reasons += [_two_lobes(fits, fit, error), failed.get("incidences", "")]
+        reasons.append(failed.get("incidences", ""))
     if error > _GOOD and misfit < 0.5 * error:
         reasons.append(f"Most of it is noise of dark samples; {_percent(misfit)} is left beyond.")
     if misfit > _WORTH_A_WORD:
-        reasons.append(_where_it_fails(samples, weights * square))
+        reasons.append(_where_it_fails(samples, square))
     typical = median(noise)
-    size = f"{_percent(error)} ({len(samples.values)} samples"
+    size = f"an RMS error of {_percent(error)} ({len(samples.values)} samples"
     size += f", noise {_percent(typical)})" if np.isfinite(typical) else ")"
+    lobe, is_single = _described(fit), fit.second is None
     if misfit <= _USABLE:
         grade = "good" if misfit <= _GOOD and not reasons[0] else "usable"
-        start = f"{_surface(fit)}, described by {fit.label} with an RMS error of {size}."
+        start = f"{_surface(fit)}, described by {lobe} with {size}."
     else:
         grade = "poor"
         what = "this surface" if isinstance(samples, DirectionalSamples) else "these values"
-        start = f"No single lobe describes {what}: {fit.label} has an RMS error of {size}."
-        if fit.second is not None:
-            start = f"Two lobes do not describe {what}: their RMS error is {size}."
+        start = f"{'No single lobe describes' if is_single else 'Two lobes do not describe'} {what}"
+        start += f": {lobe} {'leaves' if is_single else 'leave'} {size}."
     return Verdict(grade, " ".join([start, *list(filter(None, reasons))[:_MOST_REASONS]]))
+
+
+def _misfit(samples: Measurements, log_ratio: Array, noise: Array, weights: Array) -> Array:
+    """Return the weighted squares of what the fit leaves beyond twice the noise, shape (n,).
+
+    Dark samples may have much noise, which excuses residuals; bright ones may not.
+    """
+    known = np.isfinite(log_ratio).all(axis=1)
+    square = np.mean(np.square(log_ratio), axis=1)
+    bright = brightness(samples, log_ratio)
+    if median(noise[bright >= median(bright)]) <= _GOOD_NOISE:
+        square = np.maximum(square - np.square(2 * noise), 0)
+    return np.where(known, weights * square, 0)
 
 
 def _percent(share: float) -> str:
     """Return a share in %, with two digits and of large ones all before the point."""
     number = 100 * share
+    if 0 < number < 0.01:
+        return "less than 0.01 %"
     return f"{number:.0f} %" if number >= 9.95 else f"{number:.2g} %"
 
 
@@ -205,22 +218,31 @@ def _is_colored(values: Sequence[float]) -> bool:
     return bool(np.ptp(values) > _COLOR * np.mean(values))
 
 
+def _described(fit: MeasuredFit) -> str:
+    """Return what a fit is called, with its γ, or how two lobes differ."""
+    if fit.second is None or fit.share is None:
+        return fit.label if fit.gamma is None else f"{fit.label} (γ = {fit.gamma:.3g})"
+    shape = ", a narrow core with long tails" if fit.second > _TAILS * fit.parameter else ""
+    symbol, share = fit.distribution.parameter.symbol, 100 * fit.share
+    lobes = f"{symbol} = {fit.parameter:.2g} and {fit.second:.2g}, {share:.0f}:{100 - share:.0f}"
+    return f"{fit.label}{shape} ({lobes}),"
+
+
 def _two_lobes(fits: Sequence[MeasuredFit], fit: MeasuredFit, error: float) -> str:
-    """Return what two lobes would gain; "" if that is little."""
-    double = min((f for f in fits if f.second is not None), key=lambda f: f.error, default=None)
-    if double is None or fit.second is not None or double.error > (1 - _GAIN) * fit.error:
+    """Return what two lobes gain over the best single one; "" if that is little."""
+    singles = [one for one in fits if one.second is None]
+    doubles = [one for one in fits if one.second is not None]
+    if not singles or not doubles:
         return ""
-    assert double.second is not None
-    assert double.share is not None
-    (narrow, share), (wide, _) = sorted(
-        [(double.parameter, double.share), (double.second, 1 - double.share)]
-    )
-    shape = "A narrow core with long tails: " if wide > _TAILS * narrow else ""
-    gain = double.error / fit.error
+    single, double = (min(group, key=lambda one: one.error) for group in (singles, doubles))
+    single = single if fit.second is not None else fit
+    gain = double.error / single.error
+    if gain > 1 - _GAIN:
+        return ""
+    if fit.second is not None:
+        return f"The best single lobe, {single.label}, leaves {_percent(error / gain)}."
     verb = "halve" if 0.4 <= gain <= 0.6 else "reduce"
-    symbol = double.distribution.parameter.symbol
-    numbers = f"{symbol} = {narrow:.2g} and {wide:.2g}, {100 * share:.0f}:{100 * (1 - share):.0f}"
-    text = f"{shape}{double.label} ({numbers}) {verb} the error to {_percent(gain * error)}."
+    text = f"{_described(double)} would {verb} the error to {_percent(gain * error)}."
     return text[0].upper() + text[1:]
 
 
@@ -237,7 +259,7 @@ def _where_it_fails(samples: Measurements, square: Array) -> str:
         below = np.bincount(place, minlength=steps.size + 1)[:-1].cumsum()
         squares = np.bincount(place, square, minlength=steps.size + 1)[:-1].cumsum()
         sides = (below, squares), (count - below, total - squares)
-        for name, (inside, part) in zip(names, sides, strict=True):
+        for name, (inside, part), is_below in zip(names, sides, (True, False), strict=True):
             mean = part / np.maximum(inside, 1)
             others = (total - part) / np.maximum(count - inside, 1)
             is_part = (inside >= max(3, _PART[0] * count)) & (inside <= _PART[1] * count)
@@ -245,7 +267,11 @@ def _where_it_fails(samples: Measurements, square: Array) -> str:
             split = inside * (count - inside) * np.square(mean - others)
             split = np.where(is_part & is_large, split, 0)
             index = int(np.argmax(split))
-            if split[index] > best:
+            if split[index] <= best:
+                continue
+            is_inside = (place <= index) == is_below
+            # Not an outlier or two.
+            if np.median(square[is_inside]) > np.median(square[~is_inside]):
                 best, size = split[index], _percent(np.sqrt(mean[index]))
                 where = f"The misfit is largest {name.format(steps[index])}: {size}."
     return where
@@ -423,18 +449,22 @@ def _resolution(
         width = np.fmin(width, 2 * half) if error > _USABLE else width
     else:
         angle, width = "β", 2 * half_width
-        step = np.degrees(np.min(np.diff(np.unique(samples.beta)), initial=np.inf))
+        step = np.degrees(np.min(np.diff(np.unique(samples.beta))[:1], initial=np.inf))
     if not (np.isfinite(width) and np.isfinite(step)):
         return None
-    sizes = f"{width:.2g}° wide in {angle} at half its height, the step {step:.2g}°"
+    sizes = f"{_degrees(width)} wide in {angle} at half its height, the step {_degrees(step)}"
     passed = width >= _LEAST_STEPS * step
     if aperture:
-        sizes += f", the aperture {aperture:.2g}°"
+        sizes += f", the aperture {aperture:g}°"
         passed &= width >= _LEAST_APERTURES * aperture
     if passed:
         return Check("resolution", True, f"The lobe is {sizes}.")
     text = f"The lobe is at most {sizes}: its peak is not resolved, the roughness is uncertain."
     return Check("resolution", False, text)
+
+
+def _degrees(angle: float) -> str:
+    return f"{angle:.0f}°" if angle >= 9.5 else f"{angle:.2g}°"
 
 
 def _peak(samples: DirectionalSamples) -> tuple[float, float]:
@@ -467,13 +497,10 @@ def _one_parameter(fit: MeasuredFit, by_incidence: Sequence[IncidenceFit]) -> Ch
     uncertain = 2 * np.hypot(low.parameter_error, high.parameter_error)
     alpha = fit.distribution.peak_alpha(parameter)
     drifts = np.ptp(parameter) > uncertain and np.ptp(alpha) > _DRIFT * np.median(alpha)
-    steps = np.diff(parameter)
-    steps = steps[np.abs(steps) > max(uncertain, _FLAT * np.ptp(parameter))]
     first, last = known[0], known[-1]
-    if drifts and last is high and (steps > 0).all():
-        text = f"rises from {_at(first)} to {_at(last)}"
-    elif drifts and last is low and (steps < 0).all():
-        text = f"falls from {_at(first)} to {_at(last)}"
+    change = last.parameter - first.parameter
+    if drifts and abs(change) >= _TREND * np.ptp(parameter):
+        text = f"{'rises' if change > 0 else 'falls'} from {_at(first)} to {_at(last)}"
     else:
         text = f"is between {_at(low)} and {_at(high)}"
     text = f"By angle of incidence {fit.distribution.parameter.symbol} {text}"
@@ -525,16 +552,20 @@ def _strength(fit: MeasuredFit, freed: MeasuredFit | None, error: float) -> Chec
         return None
     gain = freed.error / fit.error
     text = f"Freeing k_s (then {', '.join(f'{value:.2g}' for value in freed.specular)}) would "
-    if gain > 1 - _GAIN:
-        rest = (
-            f"reduce the error to {_percent(gain * error)} only" if gain < 0.95 else "gain nothing"
-        )
-        return Check("strength", True, f"{text}{rest}.")
+    if gain > _NO_GAIN:
+        return Check("strength", True, f"{text}gain nothing.")
     text += f"reduce the error from {_percent(error)} to {_percent(gain * error)}"
-    if np.allclose(freed.specular, np.pi, rtol=_NEAR_PI):
+    is_little = gain > 1 - _GAIN or error * np.sqrt(1 - gain**2) < _SMALL_GAIN
+    if not is_little and np.allclose(freed.specular, np.pi, rtol=_NEAR_PI):
         text += ". k_s is near π: are these reflectance factors, π f_r?"
         return Check("strength", False, text, argument="values_are")
-    return Check("strength", False, f"{text}: the model, not the calibration, is in doubt.")
+    if is_little or error <= _GOOD:
+        return Check("strength", True, f"{text} only.")
+    if freed.f0 is not None and np.mean(freed.f0) > 1:
+        text += ": F does not rise to 1 towards grazing as the model's does"
+    else:
+        text += ": the model, not the calibration, is in doubt"
+    return Check("strength", False, f"{text}.")
 
 
 def _outliers(weights: Array, is_beyond_noise: NDArray[np.bool_]) -> Check:

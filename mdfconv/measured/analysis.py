@@ -36,6 +36,8 @@ _HORIZON = 90.0
 _NARROW_LIMIT = 60.0
 # A shape of more parameters whose error is not less by this is the simpler one again.
 _SAME_SHAPE = 0.99
+# Of a fit that leaves less, relatively, nothing is left for another one to explain.
+_EXACT = 1e-6
 # Candidates, and choices, are compared on so many samples at most.
 _MOST_SAMPLES = 5_000
 _SEED = 2
@@ -298,13 +300,21 @@ def _fitted(
 
 def distinct(fits: Sequence[MeasuredFit]) -> list[MeasuredFit]:
     """Return fits without those that are a simpler one again: γ = 2 is GGX, γ → ∞ Beckmann."""
-    return [
-        one
-        for one in fits
-        if not any(
-            other.size < one.size and one.error > _SAME_SHAPE * other.error for other in fits
-        )
-    ]
+    return [one for one in fits if not any(_is_again(one, other) for other in fits)]
+
+
+def _is_again(one: MeasuredFit, other: MeasuredFit) -> bool:
+    """Return whether a fit is a simpler one again."""
+    if one.size <= other.size:
+        return False
+    if one.error > _SAME_SHAPE * other.error or other.log_rmse < _EXACT:
+        return True
+    second = one.distribution.second_parameter
+    if second is None or second.default is None or one.gamma_error is None:
+        return False
+    equal = one.distribution.with_gamma(second.default).equivalent
+    is_equal = equal is not None and equal.same_lobe and equal.name == other.name
+    return is_equal and abs(one.distribution.gamma - second.default) <= one.gamma_error
 
 
 def ranked(fits: Sequence[MeasuredFit]) -> list[MeasuredFit]:
@@ -425,10 +435,10 @@ def _positive(name: str, samples: Measurements, model: BrdfModel) -> Measurement
         notes += note_of(lowest < 0, "samples have a negative value and are fitted as they are")
         return replace(samples, notes=notes)
     if not (lowest > 0).any():
-        raise MdfconvError(
-            f"{name}: no sample is positive in every channel", "no surface scatters 0 or less"
-        )
-    notes += note_of(lowest == 0, "samples are exactly 0 and left out")
+        reason = "no sample is positive in every channel: there is no lobe to fit"
+        raise MdfconvError(f"{name}: {reason}")
+    where = "as in the shadow of the detector"
+    notes += note_of(lowest == 0, f"samples are exactly 0, {where}, and left out")
     notes += note_of(lowest < 0, "samples are negative and left out")
     return replace(samples.select(lowest > 0), notes=notes)
 

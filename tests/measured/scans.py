@@ -1,4 +1,4 @@
-"""Measurements to write into files: a GGX BRDF at directions that are known."""
+"""Measurements to write into files: a GGX mirror at directions that are known."""
 
 import numpy as np
 
@@ -10,12 +10,19 @@ def vector(theta, phi):
 
 
 def ggx(incident, outgoing, alpha=ALPHA):
-    """D / (4 cos cos), without Fresnel and masking, from vectors."""
+    """D G / (4 cos cos) of a perfect mirror, G by Smith, from vectors."""
     half = incident + outgoing
     half = half / np.linalg.norm(half, axis=-1, keepdims=True)
     slope = (half[..., 0] ** 2 + half[..., 1] ** 2) / half[..., 2] ** 2 / alpha**2
     density = 1 / (np.pi * alpha**2 * half[..., 2] ** 4 * (1 + slope) ** 2)
-    return density / (4 * incident[..., 2] * outgoing[..., 2])
+    masking = 2 / (smith(incident, alpha) + smith(outgoing, alpha))
+    return masking * density / (4 * incident[..., 2] * outgoing[..., 2])
+
+
+def smith(omega, alpha):
+    """Return 1 + 2 Λ of GGX."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sqrt(1 + alpha**2 * (1 / omega[..., 2] ** 2 - 1))
 
 
 def grid(incidences=(10, 35, 60), zeniths=range(0, 80, 5), azimuths=range(0, 360, 30)):

@@ -5,8 +5,8 @@ import pytest
 
 from mdfconv.distributions import distribution, one_parameter_distributions
 from mdfconv.errors import MdfconvError
-from mdfconv.measured import brdf_fit
-from mdfconv.measured.brdf_fit import BrdfModel, fit_distribution
+from mdfconv.measured.brdf_fit import fit_distribution
+from mdfconv.measured.model import SLICE_LOSSES, BrdfModel
 from mdfconv.measured.samples import Samples
 from tests.cli.runner import run
 
@@ -20,7 +20,7 @@ def samples(values):
     return Samples(BETA, np.asarray(values)[:, None], ("value",), "ndf")
 
 
-@pytest.mark.parametrize("loss", brdf_fit.SLICE_LOSSES)
+@pytest.mark.parametrize("loss", SLICE_LOSSES)
 @pytest.mark.parametrize("name", NAMES)
 def test_a_unit_changes_only_the_unit(name, loss):
     target = distribution(name)
@@ -30,7 +30,7 @@ def test_a_unit_changes_only_the_unit(name, loss):
         found = fit_distribution(samples(LOBE * scale), target, BrdfModel(loss), gamma=gamma)
         assert found.parameters == pytest.approx(plain.parameters, rel=1e-6)
         assert found.rmse == pytest.approx(plain.rmse * scale, rel=1e-6, abs=0)
-        assert np.isfinite([*found.errors.values(), found.aic, found.bic]).all()
+        assert np.isfinite([*found.errors.values(), found.bic]).all()
 
 
 def scan(folder, lines):
@@ -61,7 +61,7 @@ def answered(path, *arguments):
 
 
 @pytest.mark.parametrize("scale", SCALES)
-@pytest.mark.parametrize("loss", brdf_fit.LOSSES)
+@pytest.mark.parametrize("loss", LOSSES)
 def test_any_unit_of_two_directions_is_answered(tmp_path, loss, scale):
     assert answered(scan(tmp_path, two_angles((LOBE * scale).tolist())), "--loss", loss)
 

@@ -30,7 +30,7 @@ _DESCRIBING = ("Name", "Manufacturer", "SourceSpectrum", "DetectorSpectrum")
 def _read(source: Source, options: ReadOptions) -> DirectionalSamples:
     options.refuse(source.path, "its XML says what its numbers are")
     root = _parsed(source)
-    structure = root.findtext(".//{*}IncidentDataStructure", "").strip()
+    structure = " ".join(root.findtext(".//{*}IncidentDataStructure", "").split())
     if structure != "Columns":
         reason = f"a BSDF whose IncidentDataStructure is '{structure[:30]}'"
         raise source.error(reason, "only Columns, a matrix over patches, is read")

@@ -55,6 +55,10 @@ _FRESNELS = {
     "metal": "Schlick 1994, with F₀ fitted in each channel",
     "none": "none, F = 1, and k_s is fitted",
 }
+_SOLVER = (
+    "are solved for, none below 0 (variable projection, Golub & Pereyra 1973); other parameters are "
+    "searched from several starts (Levenberg & Marquardt)"
+)
 
 
 @dataclass(frozen=True)
@@ -310,10 +314,12 @@ def _swatch(values: Sequence[float], channels: Sequence[str]) -> str:
 def _precision(result: ChannelFits) -> str:
     """Return what ± is, and how far choices move the parameter."""
     count = len(result.by_incidence)
+    texts = ["± is one standard error, of residuals that depend on their neighbours."]
     if count > 1:
-        texts = [f"± is one standard error, from the scatter of {count} angles of incidence."]
-    else:
-        texts = ["± is one standard error, of residuals that are not taken for independent."]
+        texts = [
+            f"± is one standard error: that of the jackknife over {count} angles of incidence, or "
+            "that of the residuals where it is larger."
+        ]
     fit = result.recommended
     same = [choice.fit.parameter for choice in result.choices if choice.fit.name == fit.name]
     if len(same) > 1:
@@ -357,12 +363,15 @@ def _candidates(result: ChannelFits, settings: BrdfModel) -> ReportTable:
     least = min(fit.bic for fit in fits)
     columns = ["shape", *_MAIN, "error", "validated error", "ΔBIC"]
     channels = result.samples.channels
+    unit = "%" if settings.loss == "log" else ""
+    if settings.deviations(result.samples) is not None:
+        unit = "σ"
     rows = [
         [
             fit.label,
             *_main(fit, channels),
-            _error(fit.error, settings),
-            _error(fit.validated_error, settings, fit.validated_spread),
+            _error(fit.error, unit),
+            _error(fit.validated_error, unit, fit.validated_spread),
             f"{fit.bic - least:.0f}",
         ]
         for fit in fits
@@ -370,13 +379,11 @@ def _candidates(result: ChannelFits, settings: BrdfModel) -> ReportTable:
     return _without_empty(ReportTable(columns, rows, fits.index(result.recommended)))
 
 
-def _error(value: float, settings: BrdfModel, spread: float | None = None) -> str:
-    """Return an error of the loss, which is relative if it is that of logarithms."""
-    if not np.isfinite(value):
-        return "—"
-    if settings.loss == "log":
+def _error(value: float, unit: str, spread: float | None = None) -> str:
+    """Return an error of the loss: relative, in standard deviations of the values, or in theirs."""
+    if unit == "%" and np.isfinite(value):
         return percent(value, spread)
-    return with_error(value, spread)
+    return f"{with_error(value, spread)} {unit}".rstrip()
 
 
 def _without_empty(table: ReportTable) -> ReportTable:
@@ -450,8 +457,10 @@ def _correlation(fit: MeasuredFit) -> ReportTable | None:
 def _method(analysis: Analysis, result: ChannelFits, digest: str) -> Iterator[tuple[str, str]]:
     """Yield how the numbers come about, by headings."""
     settings, fit = analysis.settings, result.recommended
+    solved = "offset and scale"
     if isinstance(result.samples, DirectionalSamples):
         yield "Masking G", _MASKINGS[settings.masking]
+        solved = "k_d, and F₀ of a metal or k_s where they are fitted,"
         fresnel = fit.fresnel or "none"
         index = fresnel.partition(":")[2]
         yield "Fresnel factor F", _FRESNELS.get(fresnel, f"exact, of a dielectric with n = {index}")
@@ -459,8 +468,13 @@ def _method(analysis: Analysis, result: ChannelFits, digest: str) -> Iterator[tu
             "k_s",
             "fitted in each channel" if settings.free_specular else "1: F carries the strength",
         )
+    weighted = settings.deviations(result.samples) is not None
+    loss = "differences of values in their standard deviations" if weighted else ""
     weights = ", with Huber's weights (1964)" if settings.robust else ""
-    yield "Loss", f"{_LOSSES[settings.loss]}{weights}"
+    yield "Loss", f"{loss or _LOSSES[settings.loss]}{weights}"
+    if settings.aperture:
+        yield "Aperture", f"the model is averaged over {settings.aperture:g}°"
+    yield "Solver", f"{solved} {_SOLVER}"
     used = len(result.samples.values)
     yield "Samples", "; ".join([f"{used} used", *analysis.notes])
     if digest:

@@ -15,6 +15,8 @@ from mdfconv.output.figures import PAGE, encoded, new_figure
 _MOST_RESULTS = 6
 # Beside each other.
 _ACROSS = 2
+# Of labels, points.
+_LINE = 9
 _STYLES = {"line": "-", "dotted": ":", "dots": "."}
 
 
@@ -39,8 +41,11 @@ def draw_panels(shown: Sequence[AnyPanel], title: str = "") -> bytes:
 
 
 def _draw(axes: Any, panel: Panel) -> None:
+    # Labels of neighbours are one line apart.
+    lines = [curve for curve in panel.curves if curve.label]
+    raised = {id(curve): _LINE * (number % 2) for number, curve in enumerate(lines)}
     for curve in panel.curves:
-        _draw_curve(axes, curve, panel.y_range)
+        _draw_curve(axes, curve, panel.y_range, raised.get(id(curve), 0))
     if panel.band:
         axes.axhspan(*panel.band, color="0.88", zorder=0)
     if panel.logarithmic:
@@ -51,7 +56,7 @@ def _draw(axes: Any, panel: Panel) -> None:
     axes.set_ylabel(_symbols(panel.y_label))
 
 
-def _draw_curve(axes: Any, curve: Curve, y_range: tuple[float, float]) -> None:
+def _draw_curve(axes: Any, curve: Curve, y_range: tuple[float, float], raised: int) -> None:
     color = _color(curve.color)
     if curve.error is not None:
         axes.errorbar(curve.x, curve.y, curve.error, fmt="o", color=color, markersize=4)
@@ -61,7 +66,7 @@ def _draw_curve(axes: Any, curve: Curve, y_range: tuple[float, float]) -> None:
     if curve.label:
         top = int(np.argmax(np.where(curve.y <= y_range[1], curve.y, -np.inf)))
         place = curve.x[top], curve.y[top]
-        near = {"xytext": (0, 3), "textcoords": "offset points", "ha": "center"}
+        near = {"xytext": (0, 3 + raised), "textcoords": "offset points", "ha": "center"}
         axes.annotate(curve.label, place, color=color, **near)
 
 

@@ -381,7 +381,8 @@ def _by_incidence(result: ChannelFits) -> Panel:
     fit = result.recommended
     joint, spread = fit.parameter, fit.parameter_error
     high = 1.3 * max(joint, parameter.max(initial=0.0))
-    x_range = _widened(angle.min(initial=90.0), angle.max(initial=0.0))
+    angles = [one.angle for one in result.by_incidence]
+    x_range = _widened(min(angles), max(angles))
     ends = np.array(x_range)
     symbol = fit.distribution.parameter.symbol
     curves = [

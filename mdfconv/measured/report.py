@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import html
 import json
+import os
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -318,7 +319,7 @@ class _MarkdownForm(_Form):
     def plots(self, contents: Contents, number: int) -> str:
         picture = self.path.with_name(f"{self.path.stem}-plots-{number + 1}.png")
         self.pictures[picture] = draw_panels(contents.plots)
-        return f"![Data, fit and residuals]({quote(picture.name)})"
+        return f"![Data, fit and residuals]({quote(os.fsencode(picture.name))})"
 
     def checks(self, contents: Contents) -> str:
         rows = [

@@ -134,10 +134,10 @@ class Result(SimpleNamespace):
         return [fit.record() | {"recommended": fit is self.recommended} for fit in self.fits]
 
 
-def analysis_of(*results, name="paint.csv", about=("Gonio & Co, 633 nm",)):
+def analysis_of(*results, name="paint.csv", about=("Gonio & Co, 633 nm",), **options):
     samples = SimpleNamespace(about=about, channels=results[0].samples.channels)
     return SimpleNamespace(
-        name=name, samples=samples, results=list(results), settings=BrdfModel(),
+        name=name, samples=samples, results=list(results), settings=BrdfModel(**options),
         notes=("3 of 462 samples are left out",),
     )  # fmt: skip
 
@@ -196,8 +196,8 @@ def test_the_page_says_what_the_fit_says():
         "paint.csv", "Gonio & Co, 633 nm", "⚠ Usable.", "A glossy dielectric over a diffuse base.",
         # √0.12 with half the relative error of α, and the digits that it supports.
         "r = 0.3464 ± 0.0017", "α = 0.1200 ± 0.0012", "F₀ = 0.0400 ± 0.0010", "n = 1.500 ± 0.010",
-        "diffuse albedo 0.300 ± 0.010", "3 angles of incidence", "The choices below move α from "
-        "0.1200 to 0.1320", "Energy reflects 47 % at 0°", "✓", "– Outliers", "ΔBIC",
+        "diffuse albedo 0.300 ± 0.010", "jackknife over 3 angles of incidence",
+        "The choices below move α from 0.1200 to 0.1320", "Energy reflects 47 % at 0°", "✓", "– Outliers", "ΔBIC",
         "7 %", "8.0 ± 0.4 %", "120", "3 of 462 samples are left out", "ab" * 32, COMMAND, "−0.41",
     ):  # fmt: skip
         assert part in text, part
@@ -418,6 +418,25 @@ def test_numbers_that_are_not_known():
     incidence = list(panels(result))[2]
     assert "1 do not determine it" in incidence.remark
     assert incidence.y_range[1] < 1
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "loss"),
+    [
+        ({}, "7.0 % 8.0 ± 0.4 %", "differences of logarithms, with Huber"),
+        ({"loss": "linear"}, "0.0700 0.080 ± 0.004", "differences of values, with Huber"),
+        (
+            {"noise": 0.02, "robust": False},
+            "0.0700 σ 0.080 ± 0.004 σ",
+            "standard deviations Solver",
+        ),
+    ],
+)
+def test_errors_have_the_unit_of_the_loss(options, error, loss):
+    analysis = analysis_of(result_of(scan()), **options)
+    text = page_of(report_files([analysis], "x", Path("a.html"), [""])).text
+    assert error in text
+    assert loss in text
 
 
 def test_only_pages_and_markdown_are_reports():

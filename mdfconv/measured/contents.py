@@ -56,8 +56,8 @@ _FRESNELS = {
     "none": "none, F = 1, and k_s is fitted",
 }
 _SOLVER = (
-    "are solved for, none below 0 (variable projection, Golub & Pereyra 1973); other parameters are "
-    "searched from several starts (Levenberg & Marquardt)"
+    "are solved for, none below 0 (variable projection, Golub & Pereyra 1973); other parameters "
+    "are searched from several starts (Levenberg & Marquardt)"
 )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -39,6 +40,8 @@ _HEMISPHERE = 2.0
 _SHOWN_SHARE = 0.99
 # The noise band, standard deviations.
 _BAND = 2.0
+_BETA = "β between normal and half vector (°)"
+_IN_PLANE_ANGLE = "θ_o in the plane of incidence (°)"
 # A symbol with its index, and what may follow it: f_r, θ_i.
 SUBSCRIPT = re.compile(r"\b([fkFθφαmCN])_([a-z]|[A-Z]{1,2})\b([ .,:)]?)")
 
@@ -129,7 +132,7 @@ def runner_up(result: ChannelFits) -> MeasuredFit | None:
     return next((fit for fit in result.fits if fit is not result.recommended), None)
 
 
-class _View:
+class _View(ABC):
     """One channel of a result, as plots show it."""
 
     def __init__(self, result: ChannelFits, channel: int) -> None:
@@ -188,13 +191,13 @@ class _View:
             yield "dotted", second
         yield "line", self.result.recommended
 
+    @abstractmethod
     def data(self) -> Panel:
         """Return data and fits."""
-        raise NotImplementedError
 
+    @abstractmethod
     def residuals(self) -> Panel:
         """Return what the recommended fit leaves."""
-        raise NotImplementedError
 
 
 class _SliceView(_View):
@@ -203,24 +206,19 @@ class _SliceView(_View):
     def data(self) -> Panel:
         data = self.samples
         assert isinstance(data, Samples)
-        last = np.degrees(data.beta[-1])
-        fine = np.radians(np.linspace(np.degrees(data.beta[0]), last, 4 * 90))
-        grid = Samples(
-            fine, np.zeros((fine.size, len(data.channels))), data.channels, data.quantity
-        )
+        fine = _fine_grid(0.0, *np.degrees(data.beta[[0, -1]]).tolist())
+        blank = np.zeros((fine.size, len(data.channels)))
+        grid = Samples(np.radians(fine), blank, data.channels, data.quantity)
         some = _thinned(self.values.size, _MOST_DOTS)
         curves = [Curve("dots", np.degrees(data.beta[some]), self.values[some], 0)]
         for kind, fit in self.fits():
-            curves.append(Curve(kind, np.degrees(fine), fit.model(grid)[:, self.channel], 0))
+            curves.append(Curve(kind, fine, fit.model(grid)[:, self.channel], 0))
         y_label = "f_r (1/sr)" if data.quantity == "brdf" else "distribution"
         return self.data_panel(curves, _BETA, y_label)
 
     def residuals(self) -> Panel:
         assert isinstance(self.samples, Samples)
         return self.residual_panel([_over_half_angle(self, np.degrees(self.samples.beta))], _BETA)
-
-
-_BETA = "β between normal and half vector (°)"
 
 
 def _over_half_angle(view: _View, degrees: Array) -> Curve:
@@ -290,12 +288,7 @@ class _DirectionView(_View):
             return self._cloud()
         low = min(scan.angle[0] for scan in self.scans)
         high = max(scan.angle[-1] for scan in self.scans)
-        curves = []
-        for scan in self.scans:
-            some = _thinned(scan.index.size, _MOST_DOTS // len(self.scans))
-            curves.append(
-                Curve("dots", scan.angle[some], self.values[scan.index[some]], scan.color)
-            )
+        curves = self._dots(self.values)
         grids = [_fine_grid(scan.incidence, low, high) for scan in self.scans]
         for kind, fit in self.fits():
             lines = self._model(fit, grids)
@@ -326,12 +319,15 @@ class _DirectionView(_View):
     def residuals(self) -> Panel:
         if not self.scans:
             return self.residual_panel([_over_half_angle(self, self._half_angles())], _BETA)
+        return self.residual_panel(self._dots(self.residual), _IN_PLANE_ANGLE)
+
+    def _dots(self, values: Array) -> list[Curve]:
+        """Return the values of samples in scans."""
         curves = []
         for scan in self.scans:
             some = _thinned(scan.index.size, _MOST_DOTS // len(self.scans))
-            left = self.residual[scan.index[some]]
-            curves.append(Curve("dots", scan.angle[some], left, scan.color))
-        return self.residual_panel(curves, _IN_PLANE_ANGLE)
+            curves.append(Curve("dots", scan.angle[some], values[scan.index[some]], scan.color))
+        return curves
 
     def _cloud(self) -> Panel:
         """Return data and fit over β, of directions that make no scans."""
@@ -361,9 +357,6 @@ class _DirectionView(_View):
             discs.append(Disc(f"θ_i {angle:.3g}°", x, y, value, angle / 90))
         title = f"What is left over the hemisphere{self.of_channel}"
         return DiscPanel(title, discs, self.limit, self.beyond)
-
-
-_IN_PLANE_ANGLE = "θ_o in the plane of incidence (°)"
 
 
 def _view(result: ChannelFits, channel: int) -> _SliceView | _DirectionView:
@@ -407,7 +400,8 @@ def _by_channel(result: ChannelFits) -> Iterator[Panel]:
         ("Diffuse albedo", "k_d", fit.diffuse, fit.diffuse_error),
         ("Reflectance along the normal", "F₀", fit.f0, fit.f0_error),
     ):
-        if values is None or errors is None:
+        # A dielectric has one index, and one F₀.
+        if values is None or errors is None or np.ptp(values) == 0:
             continue
         y, error = np.array(values), np.nan_to_num(np.array(errors, float), posinf=0)
         high = 1.15 * max(float((y + error).max()), 1e-3)

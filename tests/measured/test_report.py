@@ -197,7 +197,8 @@ def test_the_page_says_what_the_fit_says():
         # √0.12 with half the relative error of α, and the digits that it supports.
         "r = 0.3464 ± 0.0017", "α = 0.1200 ± 0.0012", "F₀ = 0.0400 ± 0.0010", "n = 1.500 ± 0.010",
         "diffuse albedo 0.300 ± 0.010", "jackknife over 3 angles of incidence",
-        "The choices below move α from 0.1200 to 0.1320", "Energy reflects 47 % at 0°", "✓", "– Outliers", "ΔBIC",
+        "The choices below move α from 0.1200 to 0.1320", "Energy reflects 47 % at 0°",
+        "✓", "– Outliers", "ΔBIC",
         "7 %", "8.0 ± 0.4 %", "120", "3 of 462 samples are left out", "ab" * 32, COMMAND, "−0.41",
     ):  # fmt: skip
         assert part in text, part
@@ -353,15 +354,18 @@ def test_three_colours_have_swatches():
 
 def test_many_channels_have_a_table_and_plots_over_the_wavelength():
     names = tuple(f"{wave} nm" for wave in range(400, 700, 25))
-    result = result_of(scan(channels=names))
+    f0 = tuple(np.linspace(0.5, 0.9, 12).tolist())
+    metal = fit("ggx", ALPHA, 12, fresnel="metal", f0=f0, n=None, n_error=None)
+    result = result_of(scan(channels=names), fits=[metal])
     shown = list(panels(result))
     assert [panel.x_label for panel in shown[-2:]] == ["wavelength λ (nm)"] * 2
+    np.testing.assert_allclose(shown[-1].curves[1].y, f0)
     np.testing.assert_array_equal(shown[-2].curves[0].x, np.arange(400, 700, 25))
     np.testing.assert_allclose(shown[-2].curves[0].y, K_D / 2.0 ** np.arange(12))
     page = page_of(report_files([analysis_of(result)], "x", Path("a.html"), [""]))
     assert "12 channels, 400 nm to 675 nm" in page.text
     # A row each, in a table that is folded; a range elsewhere.
-    assert re.search(r"400 nm 0\.300 ± 0\.010 0\.0400 ± 0\.0010 425 nm", page.text)
+    assert re.search(r"400 nm 0\.300 ± 0\.010 0\.5000 ± 0\.0010 425 nm", page.text)
     assert "diffuse albedo 0.000146 to 0.3" in page.text
 
 

@@ -303,8 +303,7 @@ class _MarkdownForm(_Form):
         written = [self.article(each, *numbered) for numbered in enumerate(articles)]
         if len(articles) > 1:
             written.insert(0, f"# {len(articles)} fits\n\n{self.table(overview(articles))}")
-        # Parts that a fit has not leave no gap.
-        return re.sub(r"\n{3,}", "\n\n", "\n\n".join(written)).rstrip()
+        return "\n\n".join(written)
 
     def text(self, text: str) -> str:
         return _MARKUP.sub(r"\\\1", _plain(text))
@@ -312,8 +311,9 @@ class _MarkdownForm(_Form):
     def numbers(self, contents: Contents) -> str:
         lines = []
         for number in contents.numbers:
+            label = f"{self.text(number.label)} " if number.label else ""
             detail = f" ({self.text(number.detail)})" if number.detail else ""
-            lines.append(f"- {self.text(number.label)} **{self.text(number.text)}**{detail}")
+            lines.append(f"- {label}**{self.text(number.text)}**{detail}")
         return "\n".join(lines)
 
     def plots(self, contents: Contents, number: int) -> str:
@@ -339,14 +339,14 @@ class _MarkdownForm(_Form):
         return markdown_text(columns, rows)
 
     def folded(self, summary: str, table: ReportTable | None) -> str:
-        return "" if table is None else f"**{summary}**\n\n{self.table(table)}"
+        return "" if table is None else f"\n\n**{summary}**\n\n{self.table(table)}"
 
     def snippets(self, contents: Contents) -> str:
         parts = []
         for snippet in contents.snippets:
             parts.append(f"### {self.text(snippet.title)}")
             parts += [self.code(snippet.text)] if snippet.text else []
-            parts.append(self.text(snippet.note))
+            parts += [self.text(snippet.note)] if snippet.note else []
         return "\n\n".join(parts)
 
     def terms(self, contents: Contents) -> str:

@@ -290,7 +290,7 @@ def _by_channel(
         return texts[:1]
     if len(texts) > _MOST_CHANNELS:
         return [f"{min(values):.3g} to {max(values):.3g}"]
-    return [f"{channel} {text}" for channel, text in zip(channels, texts, strict=True)]
+    return [f"{channel}: {text}" for channel, text in zip(channels, texts, strict=True)]
 
 
 def _line(values: Sequence[float], errors: Sequence[float] | None, channels: Sequence[str]) -> str:

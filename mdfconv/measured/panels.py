@@ -25,6 +25,8 @@ COLORS = 8
 _MOST_DOTS = 1500
 # So near the plane of incidence a sample belongs to the scan in it, degrees.
 _IN_PLANE = 3.0
+# Of a sine that is 0 but for rounding.
+_UPRIGHT = 1e-9
 # Fewer samples in the plane are no scan.
 _SHORTEST_SCAN = 4
 # Steps of a curve, degrees; towards the mirror direction they shrink to follow a narrow peak.
@@ -34,8 +36,10 @@ _NARROWEST_STEP = 0.01
 _MOST_CHANNELS = 3
 # Discs of residuals, one an angle of incidence.
 _MOST_DISCS = 6
-# So many samples beside the plane for one in it make a hemisphere.
-_HEMISPHERE = 2.0
+# Of fewer samples at each an angle of incidence is one of many directions by chance.
+_FEWEST_AT_ANGLE = 20
+# Of samples beside the plane this share makes a hemisphere.
+_HEMISPHERE = 0.3
 # Of the residuals this share decides the axis; those beyond are drawn at its end.
 _SHOWN_SHARE = 0.99
 # The noise band, standard deviations.
@@ -246,6 +250,8 @@ class _DirectionView(_View):
         self.incidence = np.degrees(polar_angle(data.incident))
         self.outgoing = np.degrees(polar_angle(data.outgoing))
         (x, y), (u, v) = data.incident[:, :2].T, data.outgoing[:, :2].T
+        # Light along the normal has no azimuth, and so that of the x axis.
+        x = np.where(np.hypot(x, y) < _UPRIGHT, 1, x)
         # Towards the mirror direction, and aside.
         self.along, self.aside = -(x * u + y * v), x * v - y * u
         self.groups = incidence_groups(data)
@@ -259,11 +265,14 @@ class _DirectionView(_View):
         return np.asarray((away < _IN_PLANE) | is_upright)
 
     @property
+    def has_few_angles(self) -> bool:
+        """Whether the samples are at angles of incidence that were chosen."""
+        return len(self.groups) * _FEWEST_AT_ANGLE <= len(self.incidence)
+
+    @property
     def is_hemisphere(self) -> bool:
-        """Whether most samples are beside the plane, at few angles of incidence."""
-        aside = np.count_nonzero(~self.in_plane)
-        few = len(self.groups) <= len(self.incidence) / 20
-        return bool(few and aside > _HEMISPHERE * np.count_nonzero(self.in_plane))
+        """Whether samples cover more than the plane at each angle of incidence."""
+        return self.has_few_angles and bool(np.mean(~self.in_plane) > _HEMISPHERE)
 
     @cached_property
     def scans(self) -> list[_PlaneScan]:
@@ -276,9 +285,9 @@ class _DirectionView(_View):
             if index.size >= _SHORTEST_SCAN:
                 found.append(_PlaneScan(angle, index[order], signed[order]))
         self.scanned = len(found)
-        # By chance some directions of many are in the plane.
-        if 2 * sum(scan.index.size for scan in found) < len(self.incidence):
-            found = found if self.is_hemisphere else []
+        count = sum(scan.index.size for scan in found)
+        if not self.has_few_angles and 2 * count < len(self.incidence):
+            return []
         chosen = [found[place] for place in _spread(len(found), COLORS)]
         colors = np.linspace(0, COLORS - 1, len(chosen)).round().astype(int).tolist()
         return [replace(scan, color=color) for scan, color in zip(chosen, colors, strict=True)]

@@ -80,14 +80,14 @@ def ticks(low: float, high: float, most: int) -> Array:
 
 
 def decades(low: float, high: float, most: int) -> Array:
-    """Return powers of ten in a range, at most so many; of a narrow range 2 and 5 as well."""
+    """Return powers of ten in a range, at most so many; of a narrow one other numbers too."""
     first, last = int(np.ceil(np.log10(low) - 1e-9)), int(np.floor(np.log10(high) + 1e-9))
     if last - first >= 2:
         every = -(-(last - first + 1) // most)
         return 10.0 ** np.arange(first, last + 1, every)
     between = np.outer(10.0 ** np.arange(first - 1, last + 1), [1, 2, 5]).ravel()
     inside = between[(between >= low) & (between <= high)]
-    return inside if inside.size > 1 else ticks(low, high, most)
+    return inside if inside.size > 2 else ticks(low, high, most)
 
 
 def number(value: float) -> str:

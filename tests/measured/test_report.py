@@ -349,7 +349,7 @@ def test_three_colours_have_swatches():
     # 0.3, 0.15 and 0.075 by the sRGB standard: 1.055 x^(1/2.4) − 0.055.
     levels = [round(255 * (1.055 * x ** (1 / 2.4) - 0.055)) for x in (0.3, 0.15, 0.075)]
     assert style == "background: #" + "".join(f"{level:02x}" for level in levels)
-    assert "R 0.300 ± 0.010, G 0.150 ± 0.010, B 0.075 ± 0.010" in page.text
+    assert "R: 0.300 ± 0.010, G: 0.150 ± 0.010, B: 0.075 ± 0.010" in page.text
 
 
 def test_many_channels_have_a_table_and_plots_over_the_wavelength():
@@ -528,6 +528,19 @@ def test_a_hemisphere_has_discs():
     assert sum(len(disc.x) for disc in panel.discs) == text.count("h0")
 
 
+def test_a_hemisphere_with_light_along_the_normal_has_discs_and_scans():
+    """There every plane is that of incidence."""
+    axes = np.array([0.0, 30.0]), np.arange(5.0, 81, 5), np.arange(0.0, 360, 15)
+    result = result_of(directions(*np.meshgrid(*axes, indexing="ij")))
+    data, _, discs = panels(result)
+    assert data.x_label.startswith("θ_o")
+    assert [disc.label for disc in discs.discs] == ["θ_i 0°", "θ_i 30°"]
+    # All around, and not on a line.
+    assert np.ptp(discs.discs[0].y) == pytest.approx(2 * 80 / 90)
+    line = data.curves[0]
+    assert line.x.min() == pytest.approx(-80)
+
+
 def test_random_directions_are_drawn_over_the_half_vector():
     rng = np.random.default_rng(2)
     theta_i, theta_o = rng.uniform(0, 80, (2, 3000))
@@ -585,7 +598,7 @@ def test_ticks_are_few_round_and_inside(low, width, most):
         (0.03, 30, [0.1, 1, 10]),
         (0.7, 12, [1, 2, 5, 10]),
         (1e-6, 1e6, [1e-6, 1e-4, 1e-2, 1, 100, 1e4, 1e6]),
-        (0.15, 0.7, [0.2, 0.5]),
+        (0.15, 1.2, [0.2, 0.5, 1]),
         (3.1, 3.4, [3.1, 3.15, 3.2, 3.25, 3.3, 3.35, 3.4]),
     ],
 )

@@ -32,7 +32,6 @@ ABOUT_PARTICULAR_ONES = {
     "studies/lights_page.py": "the pair that was rendered, and laws of particular pairs",
     "cli/furnace_command.py": "the names of BRDFs",
     "cli/compare_command.py": "the names of BRDFs",
-    "measured/report.py": "the forms in which files store a lobe",
     "measured/brdf_fit.py": "Schlick's Fresnel factor",
     "scene/light.py": "what lights are described by",
     "scene/mitsuba/convert.py": "the target by default, of those that Mitsuba has",
@@ -45,9 +44,7 @@ ABOUT_PARTICULAR_ONES = {
     "cli/fit_table_command.py": "the paper's reference",
 }
 # Modules outside the command line that may quote options, each with the reason.
-QUOTES_OPTIONS = {
-    "measured/report.py": "by which metric the page converts",
-}
+QUOTES_OPTIONS: dict[str, str] = {}
 # The pages of studies say by which commands they are made.
 QUOTING_WING = "studies/"
 OPTION = re.compile(r"(?<![\w-])--[a-z]")

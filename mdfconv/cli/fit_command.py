@@ -218,7 +218,7 @@ def command(
         from mdfconv.measured.report import report_files
 
         line = join(["mdfconv", *sys.argv[1:]])
-        contents |= report_files(analyses, line, report, dict(zip(files, analyses, strict=True)))
+        contents |= report_files(analyses, line, report, list(map(_sha256, files)))
     form = tables.form_of(format_, output)
     rows = _rows(analyses, ends, separate=separate, for_people=form in ("table", "markdown"))
     names = list(dict.fromkeys(name for row in rows for name in row))
@@ -242,6 +242,15 @@ def _analysis(
         which = f"{' and '.join(needs_two)} {'need' if len(needs_two) > 1 else 'needs'}"
         raise MdfconvError(f"{path}: {which} two directions", "this file has one angle")
     return fit(samples, name=path.name, **settings)
+
+
+def _sha256(path: Path) -> str:
+    """Return the SHA-256 of a file, in hexadecimal; nothing of standard input, which is read."""
+    from hashlib import sha256
+
+    from mdfconv.output.files import STANDARD_INPUT
+
+    return "" if str(path) == STANDARD_INPUT else sha256(path.read_bytes()).hexdigest()
 
 
 def _in_processes(work: Callable[[Path], Analysis], files: Sequence[Path]) -> list[Analysis]:

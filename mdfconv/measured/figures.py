@@ -1,176 +1,106 @@
-"""The pictures of fits to measurements: data, fits, and what they leave."""
+"""The plots of a fit as PNG."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from mdfconv.brdf.microfacet import polar_angle
-from mdfconv.distributions.evaluation import Array, Indices
-from mdfconv.measured.analysis import Analysis, ChannelFits
-from mdfconv.measured.brdf_fit import MeasuredFit
-from mdfconv.measured.samples import DirectionalSamples, Samples
-from mdfconv.output.figures import PAGE, encoded, line_style, new_figure
+from mdfconv.measured.analysis import Analysis
+from mdfconv.measured.panels import COLORS, SUBSCRIPT, AnyPanel, Curve, DiscPanel, Panel, panels
+from mdfconv.output.figures import PAGE, encoded, new_figure
 
-# Of a curve, one a pixel.
-_POINTS = 600
-# Side by side; pictures of more would be unreadable.
-_MOST_CHANNELS = 6
-# Angles of incidence that a picture can tell apart.
-_MOST_CURVES = 8
-# So near to each other two angles of incidence are one, degrees.
-_SAME_ANGLE = 0.25
-# So near the plane of incidence a sample belongs to the scan in it, degrees.
-_IN_PLANE = 3.0
-# Of a cloud, which more do not change.
-_MOST_POINTS = 4000
+# Results of one channel each that one picture can hold.
+_MOST_RESULTS = 6
+# Beside each other.
+_ACROSS = 2
+# Of labels, points.
+_LINE = 9
+_STYLES = {"line": "-", "dotted": ":", "dots": "."}
 
 
-def draw_analysis(analysis: Analysis, *, logarithms: bool) -> bytes:
-    """Return a PNG of every channel and the fits to it.
-
-    Residuals are of logarithms where the fit minimized those.
-    """
-    panels = [
-        (result, channel)
-        for result in analysis.results
-        for channel in range(len(result.samples.channels))
-    ]
-    if isinstance(analysis.samples, DirectionalSamples):
-        return _draw_directions(panels, analysis.name, logarithms=logarithms)
-    return _draw_slices(panels[:_MOST_CHANNELS], analysis.name, logarithms=logarithms)
+def draw_analysis(analysis: Analysis) -> bytes:
+    """Return a PNG of the recommended fit: data and curves, residuals, each incidence alone."""
+    shown = [panel for result in analysis.results[:_MOST_RESULTS] for panel in panels(result)]
+    return draw_panels(shown, analysis.name)
 
 
-def draw_parts(analysis: Analysis, *, logarithms: bool) -> Iterator[tuple[str, bytes]]:
-    """Yield the pictures of a page by what they show.
+def draw_panels(shown: Sequence[AnyPanel], title: str = "") -> bytes:
+    """Return a PNG of plots, for screens of two pixels a point."""
+    down = -(-len(shown) // _ACROSS)
+    figure = new_figure(PAGE[0] * 1.5, PAGE[1] * 0.65 * down)
+    # Names are no formulas.
+    figure.suptitle(title, parse_math=False)
+    for place, panel in enumerate(shown):
+        if isinstance(panel, DiscPanel):
+            _draw_discs(figure, panel, (down, _ACROSS, place + 1))
+        else:
+            _draw(figure.add_subplot(down, _ACROSS, place + 1), panel)
+    return encoded(figure, dpi=192)
 
-    One for each channel of two directions; of one angle all channels on linear and on logarithmic
-    axes.
-    """
-    if isinstance(analysis.samples, Samples):
-        for name, kind in (("linear", False), ("logarithmic", True)):
-            yield name, draw_analysis(analysis, logarithms=kind)
+
+def _draw(axes: Any, panel: Panel) -> None:
+    # Labels of neighbours are one line apart.
+    lines = [curve for curve in panel.curves if curve.label]
+    raised = {id(curve): _LINE * (number % 2) for number, curve in enumerate(lines)}
+    for curve in panel.curves:
+        _draw_curve(axes, curve, panel.y_range, raised.get(id(curve), 0))
+    if panel.band:
+        axes.axhspan(*panel.band, color="0.88", zorder=0)
+    if panel.logarithmic:
+        axes.set_yscale("log", nonpositive="mask")
+    axes.set(xlim=panel.x_range, ylim=panel.y_range)
+    axes.set_title(_caption(panel), parse_math=False)
+    axes.set_xlabel(_symbols(panel.x_label))
+    axes.set_ylabel(_symbols(panel.y_label))
+
+
+def _draw_curve(axes: Any, curve: Curve, y_range: tuple[float, float], raised: int) -> None:
+    color = _color(curve.color)
+    if curve.error is not None:
+        axes.errorbar(curve.x, curve.y, curve.error, fmt="o", color=color, markersize=4)
         return
-    for result in analysis.results:
-        for channel, name in enumerate(result.samples.channels):
-            panel = [(result, channel)]
-            picture = _draw_directions(panel, analysis.name, logarithms=logarithms)
-            yield f"channel {name}", picture
+    style = _STYLES[curve.kind]
+    axes.plot(curve.x, curve.y, style, color=color, markersize=3, linewidth=1.2)
+    if curve.label:
+        top = int(np.argmax(np.where(curve.y <= y_range[1], curve.y, -np.inf)))
+        place = curve.x[top], curve.y[top]
+        near = {"xytext": (0, 3 + raised), "textcoords": "offset points", "ha": "center"}
+        axes.annotate(curve.label, place, color=color, **near)
 
 
-def _draw_slices(
-    panels: Sequence[tuple[ChannelFits, int]], title: str, *, logarithms: bool
-) -> bytes:
-    """Return a PNG with a column for each channel: data and fits, the residuals beneath."""
-    alone = len(panels) == 1
-    figure = new_figure(PAGE[0] * (1 + 0.6 * (len(panels) - 1)), PAGE[1])
-    axes = figure.subplots(2, len(panels), sharex=True, height_ratios=(3, 2), squeeze=False)
-    for (upper, lower), (result, channel) in zip(axes.T, panels, strict=True):
-        data = result.samples
-        assert isinstance(data, Samples)
-        degrees, values = np.degrees(data.beta), data.values[:, channel]
-        fine = replace(data, beta=np.linspace(data.beta[0], data.beta[-1], _POINTS))
-        upper.plot(degrees, values, "o", color="0.6", markersize=3, label="data")
-        for fit in result.fits:
-            style = line_style(fit.distribution.name)
-            curve = fit.model(fine)[:, channel]
-            upper.plot(np.degrees(fine.beta), curve, label=_label(fit), **style)
-            residual = _residual(fit.model(data)[:, channel], values, logarithms=logarithms)
-            lower.plot(degrees, residual, **style)
-        if logarithms:
-            upper.set_yscale("log", nonpositive="mask")
-        upper.set_title(title if alone else f"{title}, {data.channels[channel]}")
-        upper.legend(fontsize=8 if alone else 7)
-        lower.set_xlabel("β between normal and half vector [degrees]")
-        if upper is axes[0, 0]:
-            upper.set_ylabel("BRDF [1/sr]" if data.quantity == "brdf" else "distribution")
-            lower.set_ylabel("ln(fit/data)" if logarithms else "fit − data")
-    return encoded(figure)
+def _draw_discs(figure: Any, panel: DiscPanel, place: tuple[int, int, int]) -> None:
+    """Draw discs side by side in the place of one plot."""
+    whole = figure.add_subplot(*place)
+    whole.set_axis_off()
+    whole.set_title(_caption(panel), parse_math=False)
+    across = min(len(panel.discs), 3)
+    down = -(-len(panel.discs) // across)
+    for number, disc in enumerate(panel.discs):
+        row, column = divmod(number, across)
+        size = 1 / across, 0.8 / down
+        axes = whole.inset_axes((column * size[0], 1 - (row + 1) / down, *size))
+        axes.set(xlim=(-1, 1), ylim=(-1, 1), aspect="equal", title=_symbols(disc.label))
+        axes.set_axis_off()
+        ends = {"vmin": -panel.limit, "vmax": panel.limit}
+        shown = axes.scatter(disc.x, disc.y, 4, disc.value, cmap="RdBu_r", **ends)
+        turn = np.linspace(0, 2 * np.pi, 100)
+        for radius in (1 / 3, 2 / 3, 1):
+            axes.plot(radius * np.cos(turn), radius * np.sin(turn), color="0.8", linewidth=0.6)
+        axes.plot(disc.mirror, 0, "k+")
+    figure.colorbar(shown, ax=whole, label="ln(fit/data)", shrink=0.7)
 
 
-def _label(fit: MeasuredFit) -> str:
-    fitted = zip(fit.distribution.parameters, fit.parameters.values(), strict=False)
-    numbers = (f"{parameter.symbol} = {value:.4g}" for parameter, value in fitted)
-    return f"{fit.distribution.name}, {', '.join(numbers)}"
+def _caption(panel: AnyPanel) -> str:
+    return f"{panel.title} ({panel.remark})" if panel.remark else panel.title
 
 
-def _residual(near: Array, values: Array, *, logarithms: bool) -> Array:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.log(near / values) if logarithms else near - values
+def _symbols(text: str) -> str:
+    return SUBSCRIPT.sub(r"$\1_\2$\3", text)
 
 
-def _draw_directions(
-    panels: Sequence[tuple[ChannelFits, int]], title: str, *, logarithms: bool
-) -> bytes:
-    """Return a PNG with a row for each channel and its best fit.
-
-    f_r over the angle of reflection on both axes, the residuals, and those over β.
-    """
-    figure = new_figure(PAGE[0] * 2, PAGE[1] * 0.62 * len(panels) + 0.4)
-    axes = figure.subplots(len(panels), 4, squeeze=False)
-    for row, (result, channel) in zip(axes, panels, strict=True):
-        linear, logarithmic, residual, scatter = row
-        data, fit = result.samples, result.fits[0]
-        assert isinstance(data, DirectionalSamples)
-        values, near = data.values[:, channel], fit.model(data)[:, channel]
-        error = _residual(near, values, logarithms=logarithms)
-        for index, angle, color, label in _scans(data):
-            for panel in (linear, logarithmic):
-                panel.plot(angle, values[index], ".", color=color, markersize=3)
-                panel.plot(angle, near[index], "-", color=color, label=label)
-            residual.plot(angle, error[index], "-", color=color, linewidth=0.8)
-        some = np.linspace(0, values.size - 1, min(values.size, _MOST_POINTS)).astype(int)
-        half = np.degrees(polar_angle(data.half[some]))
-        scatter.plot(half, error[some], ".", color="0.3", markersize=2)
-        linear.set(title=f"{title}, {data.channels[channel]}", ylabel="f_r [1/sr]")
-        logarithmic.set(title=fit.distribution.label)
-        logarithmic.set_yscale("log", nonpositive="mask")
-        residual.set(title="ln(fit/data)" if logarithms else "fit − data [1/sr]")
-        scatter.set(title="the same over β, all samples")
-    for panel in axes[-1, :3]:
-        panel.set_xlabel("θ_o in the plane of incidence [degrees]")
-    axes[-1, 3].set_xlabel("β of the half vector [degrees]")
-    if axes[0, 1].lines:
-        axes[0, 1].legend(fontsize=7)
-    return encoded(figure, dpi=110)
-
-
-def incidences(data: DirectionalSamples) -> Array:
-    """Return the angles of incidence of samples, degrees, each once."""
-    angle, whole = _rounded_incidence(data)
-    return np.array([np.median(angle[np.abs(angle - a) <= _SAME_ANGLE]) for a in whole])
-
-
-def _rounded_incidence(data: DirectionalSamples) -> tuple[Array, Array]:
-    """Return the angle of incidence of each sample, and the different ones, in degrees."""
-    angle = np.degrees(polar_angle(data.incident))
-    return angle, np.unique(np.round(angle / _SAME_ANGLE)) * _SAME_ANGLE
-
-
-def _scans(data: DirectionalSamples) -> Iterator[tuple[Indices, Array, Any, str]]:
-    """Yield the samples in the plane of incidence for some angles of incidence.
-
-    Their indices in order, their θ_o in degrees, positive on the side of the mirror direction, a
-    colour and a label.
-    """
+def _color(color: int | None) -> Any:
     from matplotlib import colormaps
 
-    incidence, whole = _rounded_incidence(data)
-    outgoing = np.degrees(polar_angle(data.outgoing))
-    (x, y), (u, v) = data.incident[:, :2].T, data.outgoing[:, :2].T
-    along, side = -(x * u + y * v), x * v - y * u
-    signed = np.where(along >= 0, outgoing, -outgoing)
-    away = np.degrees(np.arctan2(np.abs(side), np.abs(along)))
-    # Along the normal every plane is that of incidence.
-    is_upright = np.minimum(incidence, outgoing) < _IN_PLANE
-    is_in_plane = (away < _IN_PLANE) | is_upright
-    if whole.size > _MOST_CURVES:
-        whole = whole[np.linspace(0, whole.size - 1, _MOST_CURVES).astype(int)]
-    for number, angle in enumerate(whole):
-        index = np.flatnonzero((np.abs(incidence - angle) < _SAME_ANGLE) & is_in_plane)
-        index = index[np.argsort(signed[index], kind="stable")]
-        color = colormaps["viridis"](0.9 * number / max(1, whole.size - 1))
-        yield index, signed[index], color, f"θ_i {angle:.3g}°"
+    return "0.2" if color is None else colormaps["viridis"](0.85 * color / (COLORS - 1))

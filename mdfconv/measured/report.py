@@ -1,88 +1,80 @@
-"""The page on a fit to measurements that a colleague can read, in one file."""
+"""The report on fits to measurements: one page of HTML, or Markdown with its pictures.
+
+`report.html` and `report.md` have the fixed texts, and `mdfconv.measured.contents` what a fit says.
+"""
 
 from __future__ import annotations
 
-import base64
 import html
+import json
+import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from string import Template
+from typing import Any, ClassVar
+from urllib.parse import quote
 
 from mdfconv import __version__
-from mdfconv.brdf.microfacet import polar_angle
-from mdfconv.conversion import convert
-from mdfconv.distributions import Distribution
-from mdfconv.distributions.endpoint import Endpoint
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.analysis import Analysis, ChannelFits
-from mdfconv.measured.figures import draw_parts, incidences
-from mdfconv.measured.samples import DirectionalSamples
+from mdfconv.measured.analysis import Analysis
+from mdfconv.measured.checks import Check
+from mdfconv.measured.contents import (
+    GRADE_MARKS,
+    Contents,
+    ReportTable,
+    contents_of,
+    overview,
+    record,
+)
+from mdfconv.measured.figures import draw_panels
+from mdfconv.measured.panels import AnyPanel, DiscPanel
+from mdfconv.measured.plots import HEIGHT, LOW_HEIGHT, TALL_HEIGHT, drawn, sketch, symbols
 from mdfconv.output.files import file_bytes
-from mdfconv.output.records import markdown_text
+from mdfconv.output.records import json_text, markdown_text
 
-_DIGITS = 6
-# What a number is handed on as: to renderers with light from all around.
-_METRIC = "environment"
-# Angles of incidence that a sentence can name.
-_NAMED = 12
-
-
-_STYLE = """
-:root { color-scheme: light dark; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
-table { border-collapse: collapse; font-size: 0.9rem; }
-th, td { border-bottom: 1px solid #8886; padding: 0.2rem 0.6rem; text-align: left; }
-div { overflow-x: auto; }
-pre { background: #8882; padding: 0.6rem; white-space: pre-wrap; overflow-wrap: anywhere; }
-h1 { overflow-wrap: anywhere; }
-img { max-width: 100%; height: auto; background: white; }
-"""
-
-
-@dataclass(frozen=True)
-class _Contents:
-    """What a report says: the table as text, snippets and PNGs by their names."""
-
-    title: str
-    verdict: str
-    facts: Sequence[str]
-    rows: Sequence[Mapping[str, str]]
-    snippets: Mapping[str, str]
-    pictures: Mapping[str, bytes]
-    command: str
+# Of a check that passed, failed, or could not be made; and its class in the page.
+_CHECK_MARKS = {True: ("✓", "passed"), False: ("⚠", "failed"), None: ("–", "open")}
+# What stands between the parts of a template.
+_PARTS = re.compile(r"<!-- .* -->\n")
+# What Markdown takes for more than text.
+_MARKUP = re.compile(r"([\\`*_\[\]<>|#~&])")
 
 
 def report_files(
-    analysis: Analysis,
-    rows: Sequence[Mapping[str, Any]],
-    command: str,
-    path: Path,
-    *,
-    chief: Sequence[str],
-    logarithms: bool,
+    analyses: Sequence[Analysis], command: str, path: Path, hashes: Sequence[str]
 ) -> dict[Path, bytes]:
     """Return the files of the report on fits: one of HTML, or of Markdown with pictures beside it.
 
-    The rows are the table of fits, lists in it as text, of which those to two directions show the
-    `chief` columns; the command is the line that makes the report, and `logarithms` says whether
-    the loss is that of logarithms. Raises as `check_report_name`.
+    Parameters
+    ----------
+    analyses : sequence of Analysis
+        The fits to each file.
+    command : str
+        The line that makes the report.
+    path : Path
+        Where the report goes; its suffix chooses the form.
+    hashes : sequence of str
+        The SHA-256 of each file, in hexadecimal; empty where it is not known.
+
+    Raises
+    ------
+    MdfconvError
+        As `check_report_name`.
     """
     check_report_name(path)
-    result = analysis.results[0]
-    contents = _Contents(
-        title=f"Fits to {analysis.name}",
-        verdict=_verdict(result),
-        facts=[*_facts(analysis), *analysis.notes],
-        rows=_table(rows, chief),
-        snippets=_snippets(result.simplest.distribution, result.simplest.parameter),
-        pictures=dict(draw_parts(analysis, logarithms=logarithms)),
-        command=command,
-    )
-    return _FORMS[path.suffix.lower()](contents, path)
+    form = _FORMS[path.suffix.lower()](path)
+    pairs = list(zip(analyses, hashes, strict=True))
+    articles = [
+        contents_of(analysis, result, command, digest)
+        for analysis, digest in pairs
+        for result in analysis.results
+    ]
+    records = [record(analysis, digest) for analysis, digest in pairs]
+    data = {"mdfconv": __version__, "command": command, "files": records}
+    return {path: file_bytes(form.page(articles, data)), **form.pictures}
 
 
 def check_report_name(path: Path) -> None:
@@ -91,123 +83,285 @@ def check_report_name(path: Path) -> None:
         raise MdfconvError(f"a report is an .html or a .md file, not {path.name}")
 
 
-def _table(rows: Sequence[Mapping[str, Any]], chief: Sequence[str]) -> list[dict[str, str]]:
-    """Return the table as text; of fits to two directions the chief columns that say something."""
-    names = list(rows[0])
-    if "specular" in names:
-        names = [name for name in names if name in chief and any(row[name] != "" for row in rows)]
-    return [{name: _cell(row[name]) for name in names} for row in rows]
+def _plain(text: str) -> str:
+    """Return text in which a character that does not print is seen as its escape."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
-def _cell(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else ""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+def _plain_lines(text: str) -> str:
+    return "\n".join(map(_plain, text.split("\n")))
 
 
-def _verdict(result: ChannelFits) -> str:
-    """Return which distribution is recommended, and why."""
-    best, cheap = result.fits[0], result.simplest
-    mdf = cheap.distribution
-    numbers = f"{mdf.name}, {mdf.parameter.symbol} = {cheap.parameter:.4g}"
-    if mdf.second_parameter:
-        numbers += f", {mdf.second_parameter.symbol} = {mdf.gamma:.4g}"
-    if cheap is best:
-        return f"{numbers}: the best fit, error {best.error:.3g}"
-    than = f"{best.distribution.name} with {best.error:.3g}"
-    return f"{numbers}: error {cheap.error:.3g}, simpler than {than}"
+class _Form(ABC):
+    """How the parts of a report are written."""
+
+    template: ClassVar[str]
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.pictures: dict[Path, bytes] = {}
+
+    def parts(self) -> list[Template]:
+        """Return the parts of the template."""
+        text = files(__package__).joinpath(self.template).read_text(encoding="utf-8")
+        return [Template(part.rstrip("\n")) for part in _PARTS.split(text)]
+
+    def article(self, template: Template, number: int, contents: Contents) -> str:
+        """Return the part of the report on one result."""
+        verdict = contents.result.verdict
+        return template.substitute(
+            anchor=_anchor(number),
+            title=self.text(contents.title),
+            about=self.text(" · ".join(contents.about)),
+            grade=verdict.grade,
+            mark=GRADE_MARKS[verdict.grade],
+            word=verdict.grade.capitalize(),
+            sentence=self.text(verdict.sentence),
+            numbers=self.numbers(contents),
+            precision=self.text(contents.precision),
+            plots=self.plots(contents, number),
+            legend=self.text(contents.legend),
+            checks=self.checks(contents),
+            choices=self.table(contents.choices),
+            candidates=self.table(contents.candidates),
+            why=self.text(contents.why),
+            spectrum=self.folded("The numbers of each channel", contents.spectrum),
+            snippets=self.snippets(contents),
+            formula=contents.formula,
+            method=self.terms(contents),
+            command=self.code(contents.command),
+            version=__version__,
+            correlation=self.folded("Correlation of the parameters", contents.correlation),
+        )
+
+    @abstractmethod
+    def page(self, articles: Sequence[Contents], data: Mapping[str, Any]) -> str:
+        """Return the whole report; the data are for machines."""
+
+    @abstractmethod
+    def text(self, text: str) -> str:
+        """Return text that is nothing but text."""
+
+    @abstractmethod
+    def numbers(self, contents: Contents) -> str:
+        """Return the numbers of the verdict."""
+
+    @abstractmethod
+    def plots(self, contents: Contents, number: int) -> str:
+        """Return the plots of a result, whose number in the report is given."""
+
+    @abstractmethod
+    def checks(self, contents: Contents) -> str:
+        """Return the checks, each with a mark."""
+
+    @abstractmethod
+    def table(self, table: ReportTable) -> str:
+        """Return a table."""
+
+    @abstractmethod
+    def folded(self, summary: str, table: ReportTable | None) -> str:
+        """Return a table that the reader unfolds; nothing without a table."""
+
+    @abstractmethod
+    def snippets(self, contents: Contents) -> str:
+        """Return the materials to paste."""
+
+    @abstractmethod
+    def code(self, text: str) -> str:
+        """Return text as it is typed."""
+
+    @abstractmethod
+    def terms(self, contents: Contents) -> str:
+        """Return how the fit was made."""
 
 
-def _facts(analysis: Analysis) -> Iterator[str]:
-    samples = analysis.samples
-    kind = "channel" if len(samples.channels) == 1 else "channels"
-    yield f"{len(samples.values)} samples, {kind} {', '.join(samples.channels)}"
-    if isinstance(samples, DirectionalSamples):
-        angles = incidences(samples)
-        if angles.size <= _NAMED:
-            yield f"angles of incidence {', '.join(f'{angle:.3g}°' for angle in angles)}"
-        else:
-            yield f"{angles.size} angles of incidence, {angles[0]:.3g}° to {angles[-1]:.3g}°"
-        reflected = np.degrees(polar_angle(samples.outgoing))
-        yield f"angles of reflection up to {reflected.max():.3g}°"
-    else:
-        low, high = np.degrees(samples.beta[[0, -1]])
-        yield f"half vectors {low:.3g}° to {high:.3g}° from the normal"
-    yield f"values from {samples.values.min():.3g} to {samples.values.max():.3g}"
+def _title(check: Check) -> str:
+    return check.name[:1].upper() + check.name[1:]
 
 
-def _snippets(mdf: Distribution, parameter: float) -> dict[str, str]:
-    """Return a fitted parameter in the forms of files, kept in the light of an environment."""
-    own = f"{mdf.label} {mdf.parameter.symbol} = {parameter:.{_DIGITS}g}"
-    # A number keeps its γ: the distribution carries it.
-    source = Endpoint(mdf)
-    try:
-        alpha = convert(parameter, source, "ggx", metric=_METRIC)
-        exponent = convert(parameter, source, "blinn-phong", metric=_METRIC)
-    except MdfconvError as error:
-        return {"mdfconv": f"{own}\n{error}"}
-    roughness = f"{alpha**0.5:.{_DIGITS}g}"
-    return {
-        "mdfconv": f"{own}, as ggx:roughness {roughness} (--metric {_METRIC})",
-        "Wavefront MTL": f"Ns {exponent:.{_DIGITS}g}\nPr {roughness}",
-        "glTF": f'"pbrMetallicRoughness": {{ "roughnessFactor": {roughness} }}',
-        "Mitsuba": '<bsdf type="roughconductor">\n'
-        '    <string name="distribution" value="ggx"/>\n'
-        f'    <float name="alpha" value="{alpha:.{_DIGITS}g}"/>\n</bsdf>',
-    }
+def _anchor(number: int) -> str:
+    return f"fit-{number + 1}"
 
 
-def _html(report: _Contents, path: Path) -> dict[Path, bytes]:
-    escape = html.escape
-    head = "".join(f"<th>{escape(column)}</th>" for column in report.rows[0])
-    cells = ("".join(f"<td>{escape(cell)}</td>" for cell in row.values()) for row in report.rows)
-    body = "".join(f"<tr>{row}</tr>\n" for row in cells)
-    facts = "".join(f"<li>{escape(fact)}</li>\n" for fact in report.facts)
-    snippets = "".join(
-        f"<h3>{escape(name)}</h3>\n<pre>{escape(text)}</pre>\n"
-        for name, text in report.snippets.items()
-    )
-    pictures = "".join(
-        f'<h3>{escape(name)}</h3>\n<img alt="{escape(name)}" '
-        f'src="data:image/png;base64,{base64.b64encode(data).decode()}">\n'
-        for name, data in report.pictures.items()
-    )
-    page = (
-        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta name="viewport" content="width=device-width">\n'
-        f"<title>{escape(report.title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
-        f"<h1>{escape(report.title)}</h1>\n<p><strong>{escape(report.verdict)}</strong></p>\n"
-        f"<h2>The data</h2>\n<ul>\n{facts}</ul>\n"
-        f"<h2>The fits</h2>\n<div><table><thead><tr>{head}</tr></thead>\n"
-        f"<tbody>\n{body}</tbody></table></div>\n"
-        f"<h2>The number to use</h2>\n{snippets}<h2>Data and fit</h2>\n{pictures}"
-        f"<h2>Made by</h2>\n<pre>{escape(report.command)}</pre>\n<p>mdfconv {__version__}</p>\n"
-        "</body>\n</html>"
-    )
-    return {path: file_bytes(page)}
+class _HtmlForm(_Form):
+    template = "report.html"
+
+    def page(self, articles: Sequence[Contents], data: Mapping[str, Any]) -> str:
+        page, several, each = self.parts()
+        written = [self.article(each, *numbered) for numbered in enumerate(articles)]
+        title = articles[0].title
+        if len(articles) > 1:
+            title = f"{len(articles)} fits"
+            first = several.substitute(title=title, overview=self._overview(articles))
+            written.insert(0, first)
+        # In ASCII, and no text of it is taken for a tag.
+        embedded = json.dumps(json.loads(json_text(data))).replace("<", "\\u003c")
+        return page.substitute(
+            title=self._escaped(title), articles="\n".join(written), data=embedded
+        )
+
+    def text(self, text: str) -> str:
+        return symbols(_plain(text))
+
+    def _escaped(self, text: str) -> str:
+        return html.escape(_plain(text))
+
+    def _overview(self, articles: Sequence[Contents]) -> str:
+        table = overview(articles)
+        links = [
+            f'{sketch(article.plots[0])}<a href="#{_anchor(number)}">{self.text(article.title)}</a>'
+            for number, article in enumerate(articles)
+        ]
+        return self._table(table, links)
+
+    def numbers(self, contents: Contents) -> str:
+        lines = []
+        for number in contents.numbers:
+            label, detail = self.text(number.label), self.text(number.detail)
+            shown = f"{label} <b>{self.text(number.text)}</b>"
+            if detail:
+                shown += f" <small>({detail})</small>"
+            if number.swatch:
+                shown += f' <span class="swatch" style="background: {number.swatch}"></span>'
+            lines.append(f"<li>{shown}</li>")
+        return "\n".join(lines)
+
+    def plots(self, contents: Contents, number: int) -> str:
+        # Residuals, and each incidence alone, find room beside data and fit.
+        is_beside = len(contents.result.by_incidence) > 1
+        heights = [TALL_HEIGHT, LOW_HEIGHT, LOW_HEIGHT] if is_beside else []
+        heights += [HEIGHT] * (len(contents.plots) - len(heights))
+        return "\n".join(map(self._figure, contents.plots, heights))
+
+    def _figure(self, panel: AnyPanel, height: int) -> str:
+        """Return a plot with its caption."""
+        remark = f" ({self.text(panel.remark)})" if panel.remark else ""
+        kind = "wide" if isinstance(panel, DiscPanel) else "tall" if height == TALL_HEIGHT else ""
+        return (
+            f'<figure class="{kind}"><figcaption><b>{self.text(panel.title)}</b>{remark}'
+            f"</figcaption>\n{drawn(panel, height)}</figure>"
+        )
+
+    def checks(self, contents: Contents) -> str:
+        rows = []
+        for check in contents.result.checks:
+            mark, kind = _CHECK_MARKS[check.passed]
+            rows.append(
+                f'<tr><td class="mark {kind}">{mark}</td><th scope="row">{self.text(_title(check))}'
+                f"</th><td>{self.text(check.text)}</td></tr>"
+            )
+        body = "\n".join(rows)
+        return f'<table class="checks"><tbody>\n{body}\n</tbody></table>'
+
+    def table(self, table: ReportTable) -> str:
+        return self._table(table, [self._lines(row[0]) for row in table.rows])
+
+    def _table(self, table: ReportTable, first: Sequence[str]) -> str:
+        head = "".join(f'<th scope="col">{self.text(name)}</th>' for name in table.columns)
+        rows = []
+        for place, (title, row) in enumerate(zip(first, table.rows, strict=True)):
+            cells = "".join(f"<td>{self._lines(cell)}</td>" for cell in row[1:])
+            kind = ' class="bold"' if place == table.bold else ""
+            rows.append(f'<tr{kind}><th scope="row">{title}</th>{cells}</tr>')
+        body = "\n".join(rows)
+        return (
+            f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>\n'
+            f"{body}\n</tbody></table></div>"
+        )
+
+    def _lines(self, text: str) -> str:
+        return "<br>".join(map(self.text, text.split("\n")))
+
+    def folded(self, summary: str, table: ReportTable | None) -> str:
+        if table is None:
+            return ""
+        return f"<details><summary>{summary}</summary>\n{self.table(table)}\n</details>"
+
+    def snippets(self, contents: Contents) -> str:
+        return "\n".join(
+            f'<section class="snippet"><h3>{self.text(snippet.title)}</h3>\n'
+            f"{self.code(snippet.text) if snippet.text else ''}\n"
+            f'<p class="small">{self.text(snippet.note)}</p></section>'
+            for snippet in contents.snippets
+        )
+
+    def code(self, text: str) -> str:
+        return f"<pre>{html.escape(_plain_lines(text))}</pre>"
+
+    def terms(self, contents: Contents) -> str:
+        return "\n".join(
+            f"<dt>{self.text(term)}</dt><dd>{self.text(text)}</dd>"
+            for term, text in contents.method
+        )
 
 
-def _markdown(report: _Contents, path: Path) -> dict[Path, bytes]:
-    files, shown = {}, []
-    for name, data in report.pictures.items():
-        picture = path.with_name(f"{path.stem}-{re.sub(r'[^0-9A-Za-z]+', '-', name)}.png")
-        files[picture] = data
-        shown.append(f"### {name}\n\n![{name}]({picture.name})")
-    snippets = [f"### {name}\n\n```\n{text}\n```" for name, text in report.snippets.items()]
-    parts = [
-        f"# {report.title}",
-        f"**{report.verdict}**",
-        "## The data",
-        "\n".join(f"- {fact}" for fact in report.facts),
-        "## The fits",
-        markdown_text(list(report.rows[0]), list(report.rows)),
-        "## The number to use",
-        *snippets,
-        "## Data and fit",
-        *shown,
-        f"## Made by\n\n```\n{report.command}\n```\n\nmdfconv {__version__}",
-    ]
-    return {path: file_bytes("\n\n".join(parts)), **files}
+class _MarkdownForm(_Form):
+    template = "report.md"
+
+    def page(self, articles: Sequence[Contents], data: Mapping[str, Any]) -> str:
+        (each,) = self.parts()
+        written = [self.article(each, *numbered) for numbered in enumerate(articles)]
+        if len(articles) > 1:
+            written.insert(0, f"# {len(articles)} fits\n\n{self.table(overview(articles))}")
+        return "\n\n".join(written)
+
+    def text(self, text: str) -> str:
+        return _MARKUP.sub(r"\\\1", _plain(text))
+
+    def numbers(self, contents: Contents) -> str:
+        lines = []
+        for number in contents.numbers:
+            label = f"{self.text(number.label)} " if number.label else ""
+            detail = f" ({self.text(number.detail)})" if number.detail else ""
+            lines.append(f"- {label}**{self.text(number.text)}**{detail}")
+        return "\n".join(lines)
+
+    def plots(self, contents: Contents, number: int) -> str:
+        picture = self.path.with_name(f"{self.path.stem}-plots-{number + 1}.png")
+        self.pictures[picture] = draw_panels(contents.plots)
+        return f"![Data, fit and residuals]({quote(os.fsencode(picture.name))})"
+
+    def checks(self, contents: Contents) -> str:
+        rows = [
+            [_CHECK_MARKS[check.passed][0], _title(check), check.text]
+            for check in contents.result.checks
+        ]
+        return self.table(ReportTable(["", "check", "result"], rows))
+
+    def table(self, table: ReportTable) -> str:
+        columns = [self.text(name) for name in table.columns]
+        rows = []
+        for place, row in enumerate(table.rows):
+            cells = ["<br>".join(map(self.text, cell.split("\n"))) for cell in row]
+            if place == table.bold:
+                cells = [f"**{cell}**" if cell else "" for cell in cells]
+            rows.append(dict(zip(columns, cells, strict=True)))
+        return markdown_text(columns, rows)
+
+    def folded(self, summary: str, table: ReportTable | None) -> str:
+        return "" if table is None else f"\n\n**{summary}**\n\n{self.table(table)}"
+
+    def snippets(self, contents: Contents) -> str:
+        parts = []
+        for snippet in contents.snippets:
+            parts.append(f"### {self.text(snippet.title)}")
+            parts += [self.code(snippet.text)] if snippet.text else []
+            parts += [self.text(snippet.note)] if snippet.note else []
+        return "\n\n".join(parts)
+
+    def terms(self, contents: Contents) -> str:
+        lines = (f"- {self.text(term)}: {self.text(text)}" for term, text in contents.method)
+        return "\n".join(lines)
+
+    def code(self, text: str) -> str:
+        # Between fences that are longer than what is in it.
+        longest = max(map(len, re.findall("`+", text)), default=0)
+        fence = "`" * max(longest + 1, 3)
+        return f"{fence}\n{_plain_lines(text)}\n{fence}"
 
 
-_FORMS = {".html": _html, ".htm": _html, ".md": _markdown}
+_FORMS: dict[str, type[_Form]] = {
+    ".html": _HtmlForm,
+    ".htm": _HtmlForm,
+    ".md": _MarkdownForm,
+}

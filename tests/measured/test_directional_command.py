@@ -1,12 +1,9 @@
-"""`mdfconv fit` on files of two directions: tables, reports, pictures, several files."""
+"""`mdfconv fit` on files of two directions: tables, several files."""
 
 import json
-import re
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from tests.cli.runner import run
 from tests.measured.test_brdf_fit import measured
@@ -54,62 +51,6 @@ def test_reflectance_and_masking(tmp_path):
     assert other["error"] > record["error"]
 
 
-class Page(HTMLParser):
-    """What a page asks for from elsewhere, and its text."""
-
-    def __init__(self):
-        super().__init__()
-        self.sources, self.words = [], []
-
-    def handle_starttag(self, tag, attributes):
-        self.sources += [value for name, value in attributes if name in ("src", "href")]
-
-    def handle_data(self, data):
-        self.words.append(data)
-
-
-def test_report(tmp_path):
-    path = write(tmp_path / "<script>paint.csv")
-    status, _, _ = run("fit", path, "--to", "ggx", "--to", "beckmann", "--report", "paint.html",
-                       cwd=tmp_path)  # fmt: skip
-    assert status == 0
-    text = (tmp_path / "paint.html").read_text()
-    page = Page()
-    page.feed(text)
-    # One file: nothing from elsewhere, no name taken for a tag.
-    assert all(source.startswith("data:image/png;base64,") for source in page.sources)
-    assert len(page.sources) == 2
-    assert "<script" not in text
-    words = " ".join(page.words)
-    for part in ("<script>paint.csv", "angles of incidence", "ggx",
-                 "roughnessFactor", "Pr ", "roughconductor", "--report paint.html"):  # fmt: skip
-        assert part in words
-    alpha = float(re.search(r'name="alpha" value="([^"]+)"', words)[1])
-    assert alpha == pytest.approx(0.2, rel=0.01)
-    roughness = float(re.search(r"roughnessFactor\": (\S+)", words)[1])
-    assert roughness == pytest.approx(alpha**0.5, rel=1e-5)
-
-
-def size(path):
-    with Image.open(path) as picture:
-        return picture.size
-
-
-def test_markdown_report_and_pictures(tmp_path):
-    path = write(tmp_path / "paint.csv")
-    words = "--to", "ggx", "--report", "paint.md", "--png", "all.png"
-    assert run("fit", path, *words, cwd=tmp_path)[0] == 0
-    text = (tmp_path / "paint.md").read_text()
-    for name in re.findall(r"!\[.*?\]\((.*?)\)", text):
-        assert size(tmp_path / name)[0] > 500
-    assert {"paint-channel-R.png", "paint-channel-G.png"} <= {
-        path.name for path in tmp_path.iterdir()
-    }
-    # A row for each channel.
-    one, both = (size(tmp_path / name) for name in ("paint-channel-R.png", "all.png"))
-    assert both[1] > 1.5 * one[1]
-
-
 def test_several_files_make_one_table(tmp_path):
     write(tmp_path / "a.csv", "ggx")
     write(tmp_path / "b.csv", "beckmann")
@@ -128,7 +69,7 @@ def test_several_files_make_one_table(tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["a.csv", "b.csv", "--png", "x.png"], "--png and --report are of one file"),
+        (["a.csv", "b.csv", "--png", "x.png"], "--png is of one file"),
         (["a.csv", "--report", "x.pdf"], "a report is an .html or a .md file"),
         (["a.csv", "--fresnel", "much"], "unknown Fresnel factor 'much'"),
         (["a.csv", "--max-angle", "4"], "no samples up to 4°"),

@@ -33,6 +33,7 @@ ABOUT_PARTICULAR_ONES = {
     "cli/furnace_command.py": "the names of BRDFs",
     "cli/compare_command.py": "the names of BRDFs",
     "measured/report.py": "the forms in which files store a lobe",
+    "measured/materials.py": "the distributions of renderers and of material libraries",
     "measured/brdf_fit.py": "Schlick's Fresnel factor",
     "scene/light.py": "what lights are described by",
     "scene/mitsuba/convert.py": "the target by default, of those that Mitsuba has",

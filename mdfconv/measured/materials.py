@@ -22,7 +22,7 @@ from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.brdf_fit import MeasuredFit
-from mdfconv.measured.substitutes import Substitute, percent, substitute
+from mdfconv.measured.substitutes import LobePair, Substitute, lobe_pair, percent, substitute
 
 # The form of a parameter that renderers store.
 _ROUGHNESS = "ggx:roughness"
@@ -36,6 +36,8 @@ _MEASURED, _GRAZING = (0, 45), 75
 _COMPARED = (0, 30, 45, 60, _GRAZING)
 # Differences of less are not worth a word, nor a diffuse albedo of less in units of F₀.
 _NOTICED, _LEAST_DIFFUSE = 0.02, 0.005
+# A second lobe pays if it leaves no more than this share of the error.
+_HALF = 0.5
 # What reflects less is compared with this.
 _BLACK = 1e-4
 # Half vectors of an albedo: within 0.7 % at 75°.
@@ -206,6 +208,14 @@ class _Appearance:
         return substitute(self.fit, "ggx")
 
     @cached_property
+    def pair(self) -> LobePair | None:
+        """The two lobes of GGX that stand for the fitted one, if they halve the error of one."""
+        if self.ggx.exact:
+            return None
+        pair = lobe_pair(self.fit, self.ggx)
+        return pair if pair.errors[0] < _HALF * self.ggx.errors[0] else None
+
+    @cached_property
     def _reflected(self) -> dict[int, Array]:
         """The fit's albedo at some angles, degrees."""
         return {
@@ -334,8 +344,17 @@ def _mitsuba_lobes(surface: _Appearance) -> tuple[list[_Lobe], str]:
     lobes = _lobes(surface.fit, *_LOBES[:2])
     if lobes:
         return lobes, ""
+    if surface.pair:
+        return _pair_of(surface, surface.pair)
     nearest = min(surface.ggx, substitute(surface.fit, "beckmann"), key=_error)
     return _whole(nearest), _stands_for(surface, nearest)
+
+
+def _pair_of(surface: _Appearance, pair: LobePair) -> tuple[list[_Lobe], str]:
+    """Return two lobes, and what they cost."""
+    mdf, (first, second) = pair.distribution, pair.parameters
+    lobes = [(pair.share, mdf, first), (1 - pair.share, mdf, second)]
+    return lobes, pair.remark(surface.fit.label)
 
 
 def _stands_for(surface: _Appearance, one: Substitute) -> str:
@@ -516,7 +535,9 @@ def _mean_layer(theta: float, normal: float) -> float:
 def _materialx(surface: _Appearance) -> _Form:
     """Return the sum of a diffuse and of specular nodes, whose distribution is GGX."""
     lobes, remark = _lobes(surface.fit, "ggx"), ""
-    if not lobes:
+    if not lobes and surface.pair:
+        lobes, remark = _pair_of(surface, surface.pair)
+    elif not lobes:
         lobes, remark = _whole(surface.ggx), _stands_for(surface, surface.ggx)
     nodes, name = [], ""
     for number, (share, _, alpha) in enumerate(lobes, 1):

@@ -18,7 +18,7 @@ from mdfconv.measured.brdf_fit import fit_distribution
 from mdfconv.measured.materials import snippets
 from mdfconv.measured.model import BrdfModel
 from mdfconv.measured.samples import directional_samples
-from mdfconv.measured.substitutes import LobeMixture
+from mdfconv.measured.substitutes import LobeMixture, lobe_pair, substitute
 
 ANGLES = (0, 30, 60, 75)
 TITLES = ["Mitsuba 3", "glTF 2.0", "MaterialX", "OpenPBR", "Wavefront MTL", "mdfconv"]
@@ -477,6 +477,38 @@ def test_two_lobes_in_one_have_the_numbers_that_were_rendered():
     better, worse = re.search(r"error there ([\d.]+) % instead of ([\d.]+) %", note).groups()
     assert float(better) < float(worse)
     assert "remains 0.17" in note
+
+
+def test_two_lobes_stand_for_a_distribution_with_long_tails():
+    texts = of(fit("gtr", 0.0023, gamma=1.12))
+    element = ElementTree.fromstring(texts["Mitsuba 3"].text)
+    assert len(element.findall("bsdf")) == 2
+    for title in ("Mitsuba 3", "MaterialX"):
+        said = re.search(
+            r"Two ggx lobes, α ([\d.]+) and ([\d.]+) at (\d+):\d+, stand for gtr \(γ = 1.12\) "
+            r"\(error ([\d.]+) % under environment, ([\d.]+) % under display\)",
+            texts[title].note,
+        )
+        first, second, share, *errors = map(float, said.groups())
+        # The metric by hand: the difference of the shares within β, over ln tan β.
+        tangent = np.exp(np.linspace(-25, 10, 40_000))
+        beta = np.arctan(tangent)
+        gtr = mdfconv.distribution("gtr", 1.12).cumulative(beta, 0.0023)
+        two = [share / 100, 1 - share / 100] @ np.array(
+            [tangent**2 / (tangent**2 + alpha**2) for alpha in (first, second)]
+        )
+        error = np.sqrt(np.sum((two - gtr) ** 2) / np.sum((gtr - np.sin(beta) ** 2) ** 2))
+        assert errors[0] == pytest.approx(100 * error, abs=0.5)
+        assert errors[0] < 0.5 * float(errors_in(texts["glTF 2.0"].note)[2])
+        assert errors[1] < 0.5 * float(errors_in(texts["glTF 2.0"].note)[3])
+
+
+def test_a_pair_finds_the_lobes_of_a_mixture():
+    measured = CLASSES["two lobes"]
+    pair = lobe_pair(measured, substitute(measured, "ggx"))
+    assert pair.share == pytest.approx(0.75, rel=1e-3)
+    assert pair.parameters == pytest.approx((0.0139, 0.206), rel=1e-3)
+    assert max(pair.errors) < 1e-3
 
 
 def test_the_mixture_is_the_sum_of_its_lobes():

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from shlex import join
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -23,7 +24,7 @@ from mdfconv.registry import ALL
 if TYPE_CHECKING:
     from mdfconv.distributions.endpoint import Endpoint
     from mdfconv.measured import Analysis, ReadOptions
-    from mdfconv.measured.model import Candidate
+    from mdfconv.measured.model import LobeShape
 
 # The name of the mixture of two lobes, as `mdfconv.measured.model` has it.
 TWO_LOBES = "ggx+ggx"
@@ -253,6 +254,11 @@ def _sha256(path: Path) -> str:
     return "" if str(path) == STANDARD_INPUT else sha256(path.read_bytes()).hexdigest()
 
 
+def _digest(path: Path) -> str:
+    """Return the SHA-256 of a file; "" of standard input, which has been read."""
+    return sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+
+
 def _in_processes(work: Callable[[Path], Analysis], files: Sequence[Path]) -> list[Analysis]:
     """Return the fits to several files, with a bar on a terminal."""
     analyses = []
@@ -345,7 +351,7 @@ def _ends(names: Sequence[str]) -> list[Endpoint]:
 
 def _targets(
     names: Sequence[str], ends: Sequence[Endpoint], gamma: float | None
-) -> list[Candidate] | None:
+) -> list[LobeShape] | None:
     """Return the candidates to fit, None for all, and say which of all a given γ leaves out."""
     from mdfconv.measured.analysis import fitted_candidates
 

@@ -21,7 +21,7 @@ from mdfconv.measured.model import (
     METAL,
     TWO_LOBES,
     BrdfModel,
-    Candidate,
+    LobeShape,
     all_candidates,
     candidate,
 )
@@ -192,7 +192,7 @@ class Analysis:
 
 def fit(
     samples: Measurements,
-    targets: Sequence[str | Distribution | Candidate] | None = None,
+    targets: Sequence[str | Distribution | LobeShape] | None = None,
     *,
     gamma: float | None = None,
     quantity: str | None = None,
@@ -267,7 +267,7 @@ def fit(
 
 
 def _fitted(
-    samples: Measurements, candidates: Sequence[Candidate], model: BrdfModel, *, is_asked: bool
+    samples: Measurements, candidates: Sequence[LobeShape], model: BrdfModel, *, is_asked: bool
 ) -> ChannelFits:
     """Return the fits of all candidates that the samples are enough for.
 
@@ -291,8 +291,11 @@ def _fitted(
     if some is not samples:
         whole = validated(samples, refitted(samples, chosen))
         # That of the same samples as the others'.
-        errors = {name: getattr(chosen, name) for name in ("validated_error", "validated_spread")}
-        whole = replace(whole, **errors)
+        whole = replace(
+            whole,
+            validated_error=chosen.validated_error,
+            validated_spread=chosen.validated_spread,
+        )
         fits = [whole if one is chosen else one for one in fits]
         chosen = whole
     return ChannelFits(samples, ranked(fits), chosen)
@@ -335,8 +338,8 @@ def recommended(fits: Sequence[MeasuredFit]) -> MeasuredFit:
 
 
 def fitted_candidates(
-    targets: Sequence[str | Distribution | Candidate] | None, gamma: float | None
-) -> list[Candidate]:
+    targets: Sequence[str | Distribution | LobeShape] | None, gamma: float | None
+) -> list[LobeShape]:
     """Return what is named, or all shapes; γ that is given applies to those that have one.
 
     Raises `MdfconvError` if γ is given and means nothing for those that are named.
@@ -366,7 +369,7 @@ def _choices(result: ChannelFits) -> list[Choice]:
     """Return the recommended fit under other options, on some of the samples if there are many."""
     fit, samples = result.recommended, _some(result.samples)
     options = replace(fit.options, fresnel=fit.fresnel or AUTO)
-    trials: list[tuple[str, Measurements, Candidate, dict[str, Any]]] = []
+    trials: list[tuple[str, Measurements, LobeShape, dict[str, Any]]] = []
     if isinstance(samples, Samples):
         other = "linear" if options.loss == "log" else "log"
         trials.append((f"{other} loss", samples, fit.what, {"loss": other}))
@@ -381,10 +384,11 @@ def _choices(result: ChannelFits) -> list[Choice]:
         if fit.fresnel in kinds:
             other = kinds[fit.fresnel]
             trials.append((f"F of a {other}", samples, fit.what, {"fresnel": other}))
-    if fit.what.is_double or fit.distribution.name == "ggx":
-        other_shape = candidate("ggx" if fit.what.is_double else TWO_LOBES)
-        label = "one lobe" if fit.what.is_double else "two lobes"
-        trials.append((label, samples, other_shape, {}))
+    double = candidate(TWO_LOBES)
+    if fit.what.is_double:
+        trials.append(("one lobe", samples, candidate(double.distribution), {}))
+    elif fit.distribution == double.distribution:
+        trials.append(("two lobes", samples, double, {}))
     choices = [Choice("k_s free", result.freed)] if result.freed else []
     for label, some, what, changes in trials:
         try:

@@ -24,8 +24,8 @@ from mdfconv.measured.model import (
     METAL,
     SLICE_LOSSES,
     BrdfModel,
-    Candidate,
     Lobe,
+    LobeShape,
     SliceLobe,
     candidate,
     lobe_at,
@@ -77,7 +77,7 @@ class MeasuredFit:
 
     Parameters
     ----------
-    what : Candidate
+    what : LobeShape
         What was fitted.
     distribution : Distribution
         The distribution, with the fitted γ if it has one; of two lobes that of both.
@@ -111,7 +111,7 @@ class MeasuredFit:
         The error at samples that were left out, and its standard error; NaN if not validated.
     """
 
-    what: Candidate
+    what: LobeShape
     distribution: Distribution
     parameters: dict[str, float]
     errors: dict[str, float]
@@ -300,7 +300,7 @@ class MeasuredFit:
 
 def fit_distribution(
     samples: Measurements,
-    target: str | Distribution | Candidate,
+    target: str | Distribution | LobeShape,
     model: BrdfModel | None = None,
     *,
     gamma: float | None = None,

@@ -125,7 +125,7 @@ def _check_fresnel(name: str) -> float | None:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class LobeShape:
     """What is fitted: a distribution, its γ free or not, or the mixture of two of its lobes."""
 
     distribution: Distribution
@@ -138,19 +138,19 @@ class Candidate:
         return TWO_LOBES if self.is_double else self.distribution.name
 
 
-def candidate(target: str | Distribution | Candidate, gamma: float | None = None) -> Candidate:
+def candidate(target: str | Distribution | LobeShape, gamma: float | None = None) -> LobeShape:
     """Return what a name or a distribution stands for; γ is free if there is one and none given."""
-    if isinstance(target, Candidate):
+    if isinstance(target, LobeShape):
         return target
     if target == TWO_LOBES:
-        return Candidate(distribution("ggx"), is_double=True)
+        return LobeShape(distribution("ggx"), is_double=True)
     mdf = distribution(target) if isinstance(target, str) else target
     if mdf.second_parameter and gamma is not None:
         mdf = mdf.with_gamma(gamma)
-    return Candidate(mdf, is_gamma_free=bool(mdf.second_parameter) and gamma is None)
+    return LobeShape(mdf, is_gamma_free=bool(mdf.second_parameter) and gamma is None)
 
 
-def all_candidates() -> list[Candidate]:
+def all_candidates() -> list[LobeShape]:
     """Return each shape once: no distribution that is another one in another parameter."""
     shapes = [mdf for mdf in one_parameter_distributions() if not _is_another(mdf)]
     return [*map(candidate, shapes), candidate(TWO_LOBES)]
@@ -207,7 +207,7 @@ class Lobe(ABC):
     # The names of the coefficients of each channel.
     linear: tuple[str, ...]
 
-    def __init__(self, samples: Any, what: Candidate, options: BrdfModel, fresnel: str) -> None:
+    def __init__(self, samples: Any, what: LobeShape, options: BrdfModel, fresnel: str) -> None:
         self.samples, self.what, self.options, self.fresnel = samples, what, options, fresnel
         # How many places there are samples at, and how a message says it.
         self.places, self.where = len(samples.values), ""
@@ -373,7 +373,7 @@ class SliceLobe(Lobe):
     def _parameter_ends(self) -> tuple[float, float]:
         ends = [parameters[[0, -1]] for _, parameters in self.starts()]
         # Beyond the candidates a lobe is narrower than the angles resolve, or nearly uniform.
-        lowest, largest = np.min(ends) / np.e, np.max(ends) * np.exp(5)
+        lowest, largest = float(np.min(ends) / np.e), float(np.max(ends) * np.exp(5))
         return lowest, min(self.what.distribution.parameter.upper, largest)
 
 
@@ -535,10 +535,11 @@ def _seen(samples: DirectionalSamples, aperture: float | None) -> tuple[Array, A
     return np.tile(incident, (len(seen), 1)), directions
 
 
-def lobe_at(samples: Measurements, what: Candidate, options: BrdfModel, fresnel: str) -> Lobe:
+def lobe_at(samples: Measurements, what: LobeShape, options: BrdfModel, fresnel: str) -> Lobe:
     """Return the lobe of a candidate at samples."""
-    kind = DirectionalLobe if isinstance(samples, DirectionalSamples) else SliceLobe
-    return kind(samples, what, options, fresnel)
+    if isinstance(samples, DirectionalSamples):
+        return DirectionalLobe(samples, what, options, fresnel)
+    return SliceLobe(samples, what, options, fresnel)
 
 
 def foreshortening(beta: Array, quantity: str) -> Array:

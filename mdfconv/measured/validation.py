@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.brdf_fit import MeasuredFit, Minimum, Problem, fit_distribution
-from mdfconv.measured.model import LOSSLESS, Candidate, lobe_at
+from mdfconv.measured.model import LOSSLESS, LobeShape, lobe_at
 from mdfconv.measured.samples import DirectionalSamples, Measurements
 from mdfconv.measured.scans import incidence_groups, scan_order
 
@@ -112,7 +113,7 @@ def _jackknifed(fit: MeasuredFit, minima: list[Minimum]) -> MeasuredFit:
     estimates = [minimum.ordered().estimates() for minimum in minima]
     count = len(minima)
 
-    def deviation(values: list[float] | Array) -> Array:
+    def deviation(values: list[Any]) -> Array:
         return np.sqrt((count - 1) * np.var(np.array(values), axis=0))
 
     errors = {
@@ -132,7 +133,7 @@ def by_incidence(samples: Measurements, fit: MeasuredFit) -> list[IncidenceFit]:
     γ and Fresnel's factor, which one angle does not tell, are those of the fit; the strength of
     the lobe and k_d are free.
     """
-    what = fit.what if fit.what.is_double else Candidate(fit.distribution)
+    what = fit.what if fit.what.is_double else LobeShape(fit.distribution)
     fresnel = LOSSLESS if fit.n is None else f"ior:{fit.n!r}"
     options = replace(fit.options, fresnel=fresnel, free_specular=True)
     alone = []

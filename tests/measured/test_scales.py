@@ -6,7 +6,7 @@ import pytest
 from mdfconv.distributions import distribution, one_parameter_distributions
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.brdf_fit import fit_distribution
-from mdfconv.measured.model import SLICE_LOSSES, BrdfModel
+from mdfconv.measured.model import LOSSES, SLICE_LOSSES, BrdfModel
 from mdfconv.measured.samples import Samples
 from tests.cli.runner import run
 

@@ -312,6 +312,9 @@ def _is_again(one: MeasuredFit, other: MeasuredFit) -> bool:
         return False
     if one.error > _SAME_SHAPE * other.error or other.log_rmse < _EXACT:
         return True
+    if one.what.is_double and one.at_limit and one.distribution == other.distribution:
+        # One lobe, and a share of what is hardly a lobe.
+        return True
     second = one.distribution.second_parameter
     if second is None or second.default is None or one.gamma_error is None:
         return False

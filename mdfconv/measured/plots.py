@@ -248,7 +248,7 @@ def _disc(disc: Disc, limit: float) -> Iterator[str]:
 
 
 def _shade_scale(limit: float) -> Iterator[str]:
-    width = 16
+    width = 13
     left = (_DISC_WIDTH - _SHADES * width) / 2
     for value in range(_SHADES):
         yield f'<rect class="d{value}" x="{left + value * width}" width="{width}" height="8"/>'

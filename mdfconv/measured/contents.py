@@ -211,12 +211,10 @@ def _numbers(fit: MeasuredFit, channels: Sequence[str]) -> Iterator[Quantity]:
     if fit.gamma is not None and fit.distribution.second_parameter:
         symbol = fit.distribution.second_parameter.symbol
         yield Quantity("", f"{symbol} = {with_error(fit.gamma, fit.gamma_error)}")
-    if fit.n is not None and fit.f0 is not None and fit.f0_error is not None:
-        n = f"n = {with_error(fit.n, fit.n_error)}"
-        yield Quantity("", f"F₀ = {with_error(fit.f0[0], fit.f0_error[0])}", n)
-    elif fit.f0 is not None:
-        swatch = _swatch(fit.f0, channels)
-        yield Quantity("", f"F₀ = {_line(fit.f0, fit.f0_error, channels)}", "", swatch)
+    if fit.f0 is not None:
+        text = f"F₀ = {_line(fit.f0, fit.f0_error, channels)}"
+        swatch = "" if fit.n is not None else _swatch(fit.f0, channels)
+        yield Quantity("", text, _index(fit), swatch)
     for label, values, errors in (
         ("diffuse albedo", fit.diffuse, fit.diffuse_error),
         (
@@ -259,6 +257,11 @@ def _positive(value: float, error: float | None) -> str:
     if error is not None and error >= value:
         return f"{value:.2g}, not determined"
     return with_error(value, error)
+
+
+def _index(fit: MeasuredFit) -> str:
+    """Return the index of refraction; nothing if there is none."""
+    return "" if fit.n is None else f"n = {with_error(fit.n, fit.n_error)}"
 
 
 def _linear(
@@ -331,15 +334,16 @@ def _precision(result: ChannelFits) -> str:
 
 
 def _legend(result: ChannelFits) -> str:
-    text = f"Dots are data and solid lines {result.recommended.label}, which is recommended"
+    texts = ["Dots: data.", f"Solid lines: {result.recommended.label}, recommended."]
     second = runner_up(result)
-    text += f"; dotted lines are {second.label}, the runner-up." if second else "."
+    if second:
+        texts.append(f"Dotted lines: {second.label}, the runner-up.")
     if np.isfinite(result.noise):
-        text += f" Grey: ± 2 standard deviations of the noise, {percent(result.noise)}."
-    return text
+        texts.append(f"Grey: ± 2 standard deviations of the noise, {percent(result.noise)}.")
+    return " ".join(texts)
 
 
-_MAIN = ("parameter", "γ", "F₀", "n", "k_d", "k_s", "offset", "scale")
+_MAIN = ("parameter", "γ", "F₀", "k_d", "k_s", "offset", "scale")
 
 
 def _main(fit: MeasuredFit, channels: Sequence[str]) -> list[str]:
@@ -347,8 +351,7 @@ def _main(fit: MeasuredFit, channels: Sequence[str]) -> list[str]:
     return [
         _own(fit),
         "" if fit.gamma is None else with_error(fit.gamma, fit.gamma_error),
-        _cell(fit.f0, fit.f0_error, channels),
-        "" if fit.n is None else with_error(fit.n, fit.n_error),
+        "\n".join(filter(None, [_cell(fit.f0, fit.f0_error, channels), _index(fit)])),
         _cell(fit.diffuse, fit.diffuse_error, channels),
         "" if _is_one(fit.specular) else _cell(fit.specular, fit.specular_error, channels),
         *(_cell(*_linear(fit, name), channels) for name in ("offset", "scale")),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from mdfconv.measured.analysis import Analysis
 from mdfconv.measured.panels import COLORS, SUBSCRIPT, AnyPanel, Curve, DiscPanel, Panel, panels
+from mdfconv.measured.plots import plain
 from mdfconv.output.figures import PAGE, encoded, new_figure
 
 # Results of one channel each that one picture can hold.
@@ -31,13 +33,16 @@ def draw_panels(shown: Sequence[AnyPanel], title: str = "") -> bytes:
     down = -(-len(shown) // _ACROSS)
     figure = new_figure(PAGE[0] * 1.5, PAGE[1] * 0.65 * down)
     # Names are no formulas.
-    figure.suptitle(title, parse_math=False)
+    figure.suptitle(plain(title), parse_math=False)
     for place, panel in enumerate(shown):
         if isinstance(panel, DiscPanel):
             _draw_discs(figure, panel, (down, _ACROSS, place + 1))
         else:
             _draw(figure.add_subplot(down, _ACROSS, place + 1), panel)
-    return encoded(figure, dpi=192)
+    with warnings.catch_warnings():
+        # A letter that the font has not is a box.
+        warnings.filterwarnings("ignore", "Glyph")
+        return encoded(figure, dpi=192)
 
 
 def _draw(axes: Any, panel: Panel) -> None:
@@ -93,7 +98,7 @@ def _draw_discs(figure: Any, panel: DiscPanel, place: tuple[int, int, int]) -> N
 
 
 def _caption(panel: AnyPanel) -> str:
-    return f"{panel.title} ({panel.remark})" if panel.remark else panel.title
+    return plain(f"{panel.title} ({panel.remark})" if panel.remark else panel.title)
 
 
 def _symbols(text: str) -> str:

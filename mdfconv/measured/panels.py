@@ -184,7 +184,7 @@ class _View(ABC):
         inside = [
             Curve(curve.kind, curve.x, np.clip(curve.y, *ends), curve.color) for curve in curves
         ]
-        title = f"What is left{self.of_channel}"
+        title = f"Residuals{self.of_channel}"
         ranges = _range_of(curves), ends
         return Panel(title, x_label, "ln(fit/data)", inside, *ranges, False, band, self.beyond)
 
@@ -364,7 +364,7 @@ class _DirectionView(_View):
             value = np.clip(self.residual[index], -self.limit, self.limit)
             x, y = radius * np.cos(turn), radius * np.sin(turn)
             discs.append(Disc(f"θ_i {angle:.3g}°", x, y, value, angle / 90))
-        title = f"What is left over the hemisphere{self.of_channel}"
+        title = f"Residuals over the hemisphere{self.of_channel}"
         return DiscPanel(title, discs, self.limit, self.beyond)
 
 

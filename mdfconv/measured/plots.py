@@ -59,14 +59,19 @@ def sketch(panel: AnyPanel) -> str:
 def _svg(title: str, width: int, height: int, parts: Iterator[str]) -> str:
     """Return an element of a page, whose units are pixels on a telephone."""
     return (
-        f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{html.escape(title)}">'
+        f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{html.escape(plain(title))}">'
         f"{''.join(parts)}</svg>"
     )
 
 
+def plain(text: str) -> str:
+    """Return text in which a character that does not print is seen as its escape."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 def symbols(text: str) -> str:
     """Return text as HTML, in which the index of f_r or θ_i is a subscript."""
-    return SUBSCRIPT.sub(r"\1<sub>\2</sub>\3", html.escape(text))
+    return SUBSCRIPT.sub(r"\1<sub>\2</sub>\3", html.escape(plain(text)))
 
 
 def ticks(low: float, high: float, most: int) -> Array:
@@ -155,7 +160,9 @@ def _axes(
 
 def _text(x: float, y: float, text: str, anchor: str, kind: str = "") -> str:
     lowered = '<tspan class="sub" dy="3">'
-    shown = SUBSCRIPT.sub(rf'\1{lowered}\2</tspan><tspan dy="-3">\3</tspan>', html.escape(text))
+    shown = SUBSCRIPT.sub(
+        rf'\1{lowered}\2</tspan><tspan dy="-3">\3</tspan>', html.escape(plain(text))
+    )
     of_kind = f' class="{kind}"' if kind else ""
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}"{of_kind}>{shown}</text>'
 
@@ -248,7 +255,7 @@ def _disc(disc: Disc, limit: float) -> Iterator[str]:
 
 
 def _shade_scale(limit: float) -> Iterator[str]:
-    width = 16
+    width = 13
     left = (_DISC_WIDTH - _SHADES * width) / 2
     for value in range(_SHADES):
         yield f'<rect class="d{value}" x="{left + value * width}" width="{width}" height="8"/>'

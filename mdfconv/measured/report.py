@@ -31,7 +31,7 @@ from mdfconv.measured.contents import (
 )
 from mdfconv.measured.figures import draw_panels
 from mdfconv.measured.panels import AnyPanel, DiscPanel
-from mdfconv.measured.plots import HEIGHT, LOW_HEIGHT, TALL_HEIGHT, drawn, sketch, symbols
+from mdfconv.measured.plots import HEIGHT, LOW_HEIGHT, TALL_HEIGHT, drawn, plain, sketch, symbols
 from mdfconv.output.files import file_bytes
 from mdfconv.output.records import json_text, markdown_text
 
@@ -83,13 +83,8 @@ def check_report_name(path: Path) -> None:
         raise MdfconvError(f"a report is an .html or a .md file, not {path.name}")
 
 
-def _plain(text: str) -> str:
-    """Return text in which a character that does not print is seen as its escape."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-
-
 def _plain_lines(text: str) -> str:
-    return "\n".join(map(_plain, text.split("\n")))
+    return "\n".join(map(plain, text.split("\n")))
 
 
 class _Form(ABC):
@@ -201,10 +196,10 @@ class _HtmlForm(_Form):
         )
 
     def text(self, text: str) -> str:
-        return symbols(_plain(text))
+        return symbols(text)
 
     def _escaped(self, text: str) -> str:
-        return html.escape(_plain(text))
+        return html.escape(plain(text))
 
     def _overview(self, articles: Sequence[Contents]) -> str:
         table = overview(articles)
@@ -306,7 +301,7 @@ class _MarkdownForm(_Form):
         return "\n\n".join(written)
 
     def text(self, text: str) -> str:
-        return _MARKUP.sub(r"\\\1", _plain(text))
+        return _MARKUP.sub(r"\\\1", plain(text))
 
     def numbers(self, contents: Contents) -> str:
         lines = []

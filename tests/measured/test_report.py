@@ -245,7 +245,9 @@ def test_records_are_embedded_for_machines():
 @pytest.mark.parametrize("suffix", ["html", "md"])
 def test_hostile_names_are_text(suffix):
     about = (HOSTILE, "</script>", "name \udcff that is no UTF-8")
-    files = plain_report(f"paint.{suffix}", name=HOSTILE, about=about)
+    result = result_of(scan(channels=("G", HOSTILE)), incidences=(20, 45, 70))
+    analysis = analysis_of(result, name=HOSTILE, about=about)
+    files = report_files([analysis], HOSTILE, Path(f"paint.{suffix}"), ["ab" * 32])
     text = files[Path(f"paint.{suffix}")].decode()
     assert "\x1b" not in text
     assert "\u202e" not in text
@@ -621,7 +623,7 @@ def test_a_picture_of_an_analysis(tmp_path):
     results = result_of(scan(), incidences=(20, 45)), result_of(hemisphere())
     for place, result in enumerate(results):
         picture = tmp_path / f"{place}.png"
-        picture.write_bytes(draw_analysis(analysis_of(result, name="$a_b$ \\x")))
+        picture.write_bytes(draw_analysis(analysis_of(result, name="$a_b$ \\x\x1b 涂料")))
         with Image.open(picture) as opened:
             assert opened.size[0] > 1500
 

@@ -160,7 +160,7 @@ class _Appearance:
     def diffuse(self) -> Array:
         """k_d, at most what the specular reflection leaves; 0 where that is all there is."""
         diffuse = np.minimum(self.averaged(self.fit.diffuse), 1 - np.maximum(self.normal, _BLACK))
-        return diffuse * (diffuse.max() > _LEAST_DIFFUSE * self.normal.max())
+        return diffuse * (diffuse.max() > _LEAST_DIFFUSE * max(self.normal.max(), _BLACK))
 
     @property
     def has_diffuse(self) -> bool:
@@ -221,6 +221,16 @@ class _Appearance:
         return {
             angle: self.averaged(self.fit.albedo(float(np.radians(angle)))) for angle in _COMPARED
         }
+
+    def gain(self, specular: _Albedo) -> float:
+        """Return what balances the errors of a specular albedo over the angles; 1 if it is good."""
+        ratios, worst = [], 0.0
+        for angle, wanted in self._reflected.items():
+            found = specular(float(np.radians(angle)))
+            ratios += [*(found / np.maximum(wanted - self.diffuse, _BLACK))]
+            error = (found + self.diffuse) / np.maximum(wanted, _BLACK) - 1
+            worst = max(worst, float(np.max(np.abs(error))))
+        return 2 / float(min(ratios) + max(ratios)) if worst > _NOTICED else 1.0
 
     def difference(self, albedo: _Albedo) -> str:
         """Return how far an albedo is from the fit's, at the angle where it is farthest."""
@@ -315,28 +325,24 @@ def _mitsuba(surface: _Appearance) -> _Form:
     lobes, remark = _mitsuba_lobes(surface)
     # So the diffuse part is as bright as can be.
     weight = 1 - float(surface.diffuse.max()) if surface.has_diffuse else 1.0
-    whole = partial(_albedo, float(np.radians(_GRAZING)), lobes, surface.fresnel)
-    masked = float(np.mean(whole(masking="separable") / whole()))
-    # Halfway between the normal, where the maskings agree, and grazing.
-    gain = 2 / (1 + masked) if masked < 1 - _NOTICED else 1.0
-    is_ggx = lobes[0][1].name == "ggx"
-    optics, fresnel = _optics(surface, gain, weight, has_principled=is_ggx)
+    plugin = partial(_optics, surface, weight, has_principled=lobes[0][1].name == "ggx")
+
+    def specular(theta: float, gain: float) -> Array:
+        return weight * _albedo(theta, lobes, plugin(gain)[1], "separable")
+
+    gain, remarks = surface.gain(partial(specular, gain=1.0)), [remark]
+    if gain != 1:
+        remarks.append(
+            f"Its specular part is scaled by {_number(gain)}, for Mitsuba's masking is separable "
+            "or the lobe another: so its albedo is off to both sides."
+        )
+    optics, _ = plugin(gain)
     parts = [optics(mdf.name, alpha) for _, mdf, alpha in lobes]
     element = parts[0] if len(parts) == 1 else _blend(1 - lobes[0][0], *parts)
     if surface.has_diffuse:
         base = _bsdf("diffuse", _colour("reflectance", surface.diffuse / (1 - weight)))
         element = _blend(weight, base, element)
-    remarks = [remark]
-    if gain > 1:
-        remarks.append(
-            f"Its masking is separable and loses up to {percent(1 - masked)}, at {_GRAZING}°: "
-            "half of that is made up for at all angles."
-        )
-
-    def albedo(theta: float) -> Array:
-        return surface.diffuse + weight * _albedo(theta, lobes, fresnel, "separable")
-
-    return _xml(element), remarks, albedo
+    return _xml(element), remarks, lambda theta: surface.diffuse + specular(theta, gain)
 
 
 def _mitsuba_lobes(surface: _Appearance) -> tuple[list[_Lobe], str]:
@@ -386,7 +392,7 @@ def _lobes(fit: MeasuredFit, *names: str) -> list[_Lobe]:
 
 
 def _optics(
-    surface: _Appearance, gain: float, weight: float, *, has_principled: bool
+    surface: _Appearance, weight: float, gain: float, *, has_principled: bool
 ) -> tuple[Callable[[str, float], ElementTree.Element], Fresnel]:
     """Return the specular plugin for a name and α, and its reflectance.
 

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from hashlib import sha256
 from pathlib import Path
 from shlex import join
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -30,6 +29,8 @@ if TYPE_CHECKING:
 TWO_LOBES = "ggx+ggx"
 # What a narrow terminal leaves out first, from the end.
 _SECONDARY = ("k_s", "n", "validated error", "F₀")
+# What may make right what a check finds, by the argument that it names.
+_HINTS = {"values_are": "--values-are factor"}
 # Of more channels a table for people has the range.
 _MOST_CHANNELS = 3
 
@@ -208,7 +209,13 @@ def command(
         "loss cosine": loss == "cosine", "loss cube-root": loss == "cube-root",
     }  # fmt: skip
     needs_two = [f"--{name}" for name, given in directional.items() if given]
-    work = partial(_analysis, columns=columns, settings=settings, needs_two=needs_two)
+    work = partial(
+        _analysis,
+        columns=columns,
+        settings=settings,
+        needs_two=needs_two,
+        is_reported=report is not None,
+    )
     analyses = [work(files[0])] if len(files) == 1 else _in_processes(work, files)
     contents: dict[Path, bytes] = {}
     if png:
@@ -233,7 +240,12 @@ def command(
 
 
 def _analysis(
-    path: Path, columns: ReadOptions, settings: dict[str, Any], *, needs_two: Sequence[str]
+    path: Path,
+    columns: ReadOptions,
+    settings: dict[str, Any],
+    *,
+    needs_two: Sequence[str],
+    is_reported: bool,
 ) -> Analysis:
     """Return the fits to a file."""
     from mdfconv.measured import Samples, fit, read
@@ -242,7 +254,11 @@ def _analysis(
     if needs_two and isinstance(samples, Samples):
         which = f"{' and '.join(needs_two)} {'need' if len(needs_two) > 1 else 'needs'}"
         raise MdfconvError(f"{path}: {which} two directions", "this file has one angle")
-    return fit(samples, name=path.name, **settings)
+    analysis = fit(samples, name=path.name, **settings)
+    for result in analysis.results:
+        # In the process of the file, if there are several.
+        _ = result.verdict, is_reported and result.choices
+    return analysis
 
 
 def _sha256(path: Path) -> str:
@@ -252,11 +268,6 @@ def _sha256(path: Path) -> str:
     from mdfconv.output.files import STANDARD_INPUT
 
     return "" if str(path) == STANDARD_INPUT else sha256(path.read_bytes()).hexdigest()
-
-
-def _digest(path: Path) -> str:
-    """Return the SHA-256 of a file; "" of standard input, which has been read."""
-    return sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
 
 
 def _in_processes(work: Callable[[Path], Analysis], files: Sequence[Path]) -> list[Analysis]:
@@ -335,7 +346,7 @@ def _tell(analysis: Analysis, *, named: bool) -> None:
         process.tell(f"{file}{channel}{verdict.grade}: {verdict.sentence}")
         for check in result.checks:
             if check.passed is False:
-                hint = f" (--{check.argument.replace('_', '-')})" if check.argument else ""
+                hint = f" ({_HINTS[check.argument]})" if check.argument else ""
                 process.tell(f"{file}{channel}warning: {check.name}: {check.text}{hint}")
 
 

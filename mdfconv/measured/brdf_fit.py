@@ -49,6 +49,8 @@ _INSIDE = 1e-9
 _AT_END = 1e-3
 # Robust weights are those of a point when it moves less than this.
 _SETTLED = 1e-4
+# The largest value of no surface is less.
+_LEAST_BRDF = 1e-30
 # Of an exact fit, whose logarithm is wanted.
 _LEAST_ERROR = 1e-150
 # Of the largest value: what is smaller has no weight 1/value² in double precision.
@@ -317,7 +319,7 @@ def fit_distribution(
             f"the {options.loss} loss needs two directions", f"known: {', '.join(SLICE_LOSSES)}"
         )
     kinds = (LOSSLESS,) if is_slice else options.kinds
-    first = Problem(lobe_at(samples, what, options, kinds[0]))
+    first = Problem(checked(lobe_at(samples, what, options, kinds[0])))
     random = np.random.default_rng(_SEED)
     index = _some(random, len(samples.values), _FIRST_FITTED)
     some = first.part(index)
@@ -364,45 +366,54 @@ def _robust(minimum: Minimum, passes: int) -> Minimum:
     return minimum
 
 
+def checked(lobe: Lobe) -> Lobe:
+    """Return a lobe; raise `MdfconvError` if there is nothing to fit at its samples."""
+    values = lobe.samples.values
+    unknowns = len(lobe.unknowns) + len(lobe.linear) * values.shape[1]
+    if values.size <= unknowns or lobe.places < 4:
+        raise MdfconvError(
+            f"{values.size} values{lobe.where} are too few to fit {unknowns} unknowns of "
+            f"{lobe.what.name}"
+        )
+    if np.ptp(values, axis=0).max() == 0:
+        raise MdfconvError("all values are equal: there is no lobe to fit")
+    largest = float(values.max())
+    if largest <= 0:
+        raise MdfconvError("no value is positive: there is no lobe to fit")
+    if lobe.is_absolute and not _LEAST_BRDF < largest < 1 / _LEAST_BRDF:
+        raise MdfconvError(
+            f"values of at most {largest:.3g} are no f_r in 1/sr",
+            "fit values of another unit with F = 1 and k_s free",
+            argument="fresnel",
+        )
+    if lobe.transform() and values.min() <= _SMALLEST_LOGARITHM * largest:
+        raise MdfconvError(
+            "the smallest value is less than 1e-100 of the largest: no loss of logarithms holds "
+            "both",
+            "leave out what is no measurement, or take the linear loss",
+        )
+    return lobe
+
+
 class Problem:
     """The projected problem: residuals of the best coefficients, by the point of a lobe."""
 
     def __init__(self, lobe: Lobe, robust: Array | None = None, unit: float | None = None) -> None:
         self.lobe = lobe
         values = np.ascontiguousarray(lobe.samples.values.T)
-        self._check(values)
-        # Of one angle in units of the largest value, whatever the measurement's; a BRDF has one.
-        largest = float(np.max(np.abs(values))) if isinstance(lobe, SliceLobe) else 1.0
+        # Whatever the unit of the measurement, in units of the largest value.
+        largest = 1.0 if lobe.is_absolute else float(np.max(np.abs(values)))
         self.unit = largest if unit is None else unit
         self._values = values / self.unit
         self.robust = np.ones(values.shape[1]) if robust is None else robust
         self._transform = lobe.transform()
         weight = lobe.weight() * self.robust
-        if self._transform and values.min() <= _SMALLEST_LOGARITHM * values.max():
-            raise MdfconvError(
-                "the smallest value is less than 1e-100 of the largest: no loss of logarithms "
-                "holds both",
-                "leave out what is no measurement, or take the linear loss",
-            )
         self._project = Projection(self._values, weight, self._transform)
 
     @property
     def count(self) -> int:
         """How many samples there are."""
         return self._values.shape[1]
-
-    def _check(self, values: Array) -> None:
-        lobe = self.lobe
-        unknowns = len(lobe.unknowns) + len(lobe.linear) * len(values)
-        if values.size <= unknowns or lobe.places < 4:
-            raise MdfconvError(
-                f"{values.size} values{lobe.where} are too few to fit {unknowns} unknowns of "
-                f"{lobe.what.name}"
-            )
-        if np.ptp(values, axis=1).max() == 0:
-            raise MdfconvError("all values are equal: there is no lobe to fit")
-        if (values <= 0).all():
-            raise MdfconvError("no value is positive: there is no lobe to fit")
 
     def part(self, index: Any) -> Problem:
         """Return the problem of some of the samples; itself for None."""

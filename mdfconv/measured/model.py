@@ -243,6 +243,11 @@ class Lobe(ABC):
         return ()
 
     @property
+    def is_absolute(self) -> bool:
+        """Whether the unit of the values matters: no coefficient stands for the lobe's strength."""
+        return not {"scale", "specular"} & set(self.linear)
+
+    @property
     def bounds(self) -> Array:
         """The least and the largest point, shape (2, unknowns)."""
         ends = [(u.coordinate(u.lower), u.coordinate(u.upper)) for u in self.unknowns]

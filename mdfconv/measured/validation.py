@@ -14,7 +14,7 @@ import numpy as np
 
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.brdf_fit import MeasuredFit, Minimum, Problem, fit_distribution
+from mdfconv.measured.brdf_fit import MeasuredFit, Minimum, Problem, checked, fit_distribution
 from mdfconv.measured.model import LOSSLESS, LobeShape, lobe_at
 from mdfconv.measured.samples import DirectionalSamples, Measurements
 from mdfconv.measured.scans import incidence_groups, scan_order
@@ -62,6 +62,7 @@ def validated(samples: Measurements, fit: MeasuredFit) -> MeasuredFit:
     for fold in folds:
         rest = whole.part(np.setdiff1d(everything, fold, assume_unique=True))
         try:
+            checked(rest.lobe)
             minimum = rest.descend(fit.point, steps=_STEPS)
         except MdfconvError:
             continue
@@ -99,7 +100,7 @@ def _folds(samples: Measurements) -> tuple[list[Indices], bool]:
         ends = np.linspace(0, len(groups), min(len(groups), _MOST_FOLDS) + 1).astype(int)
         return [np.concatenate(groups[first:last]) for first, last in pairwise(ends)], True
     order = scan_order(samples)
-    block = np.arange(len(order)) * _BLOCKS // len(order)
+    block = np.arange(len(order)) * min(_BLOCKS, len(order)) // len(order)
     return [order[block % _BLOCK_FOLDS == fold] for fold in range(_BLOCK_FOLDS)], False
 
 

@@ -28,26 +28,32 @@ def write(path, name="ggx", seed=1, **rest):
 
 def test_table(tmp_path):
     path = write(tmp_path / "paint.csv")
-    status, out, err = run("fit", path, "--loss", "log", "--format", "json")
+    status, out, err = run("fit", path, "--fresnel", "none", "--format", "json")
     assert status == 0
     records = {record["distribution"]: record for record in json.loads(out)}
     ggx = records["ggx"]
-    assert abs(ggx["parameter"] - 0.2) < 4 * ggx["stderr"]
+    assert abs(ggx["parameter"] - 0.2) < 4 * ggx["parameter_stderr"]
     assert ggx["diffuse"] == pytest.approx([0.3, 0.1], rel=0.02)
     assert ggx["specular"] == pytest.approx([0.8, 0.5], rel=0.02)
-    assert ggx["masking"] == "smith"
+    assert ggx["f0"] is None
+    assert ggx["recommended"]
+    # k_d + k_s is above 1.
+    assert ggx["verdict"] == "usable"
+    assert {check["name"] for check in ggx["checks"] if check["passed"] is False} == {"energy"}
+    assert {check["name"] for check in ggx["checks"]} >= {"energy", "resolution", "left out"}
     assert records["beckmann"]["error"] > 3 * ggx["error"]
-    assert "best is ggx" in err or "best is smoothie" in err
+    assert "usable: " in err
+    assert "warning: energy: " in err
     assert "degrees" in err
 
 
 def test_reflectance_and_masking(tmp_path):
     path = write(tmp_path / "paint.csv", reflectance=0.3)
-    words = "--to", "ggx", "--loss", "log", "--fresnel", "fit", "--format", "json"
+    words = "--to", "ggx", "--fresnel", "metal", "--free-specular", "--format", "json"
     (record,) = json.loads(run("fit", path, *words)[1])
-    assert abs(record["reflectance"] - 0.3) < 4 * record["reflectance_stderr"]
+    assert abs(record["f0"][0] - 0.3) < 4 * record["f0_stderr"][0]
+    assert abs(record["specular"][1] - 0.5) < 4 * record["specular_stderr"][1]
     (other,) = json.loads(run("fit", path, *words, "--masking", "none")[1])
-    assert other["masking"] == "none"
     assert other["error"] > record["error"]
 
 
@@ -55,7 +61,7 @@ def test_several_files_make_one_table(tmp_path):
     write(tmp_path / "a.csv", "ggx")
     write(tmp_path / "b.csv", "beckmann")
     status, out, err = run(
-        "fit", "*.csv", "--to", "ggx", "--to", "beckmann", "--loss", "log", "--format", "json",
+        "fit", "*.csv", "--to", "ggx", "--to", "beckmann", "--fresnel", "none", "--format", "json",
         cwd=tmp_path,
     )  # fmt: skip
     assert status == 0
@@ -63,7 +69,7 @@ def test_several_files_make_one_table(tmp_path):
     for record in json.loads(out):
         best.setdefault(record["file"], record["distribution"])
     assert best == {"a.csv": "ggx", "b.csv": "beckmann"}
-    assert "a.csv: best is ggx" in err
+    assert "a.csv: usable: " in err
 
 
 @pytest.mark.parametrize(
@@ -75,8 +81,9 @@ def test_several_files_make_one_table(tmp_path):
         (["a.csv", "--max-angle", "4"], "no samples up to 4°"),
         (["a.csv", "--cells", "100"], "cells are those of a MERL file"),
         (["a.csv", "--theta-i", "nowhere"], "nowhere"),
-        (["one.csv", "--fresnel", "fit"], "need two directions"),
-        (["one.csv", "--loss", "cosine"], "need two directions"),
+        (["one.csv", "--fresnel", "metal"], "--fresnel needs two directions"),
+        (["one.csv", "--loss", "cosine"], "--loss cosine needs two directions"),
+        (["one.csv", "--aperture", "1", "--noise", "2%"], "--aperture and --noise need two"),
         (["none.csv"], "cannot read none.csv"),
     ],
 )

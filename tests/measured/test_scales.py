@@ -63,7 +63,10 @@ def answered(path, *arguments):
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("loss", LOSSES)
 def test_any_unit_of_two_directions_is_answered(tmp_path, loss, scale):
-    assert answered(scan(tmp_path, two_angles((LOBE * scale).tolist())), "--loss", loss)
+    """With k_s free: reflectance itself has one unit."""
+    path = scan(tmp_path, two_angles((LOBE * scale).tolist()))
+    assert answered(path, "--loss", loss, "--fresnel", "none")
+    assert answered(path, "--loss", loss) == (scale == 1)
 
 
 @pytest.mark.parametrize("lines", [one_angle, two_angles])

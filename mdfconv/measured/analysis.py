@@ -34,6 +34,8 @@ BRDF_LIMIT = 80.0
 _HORIZON = 90.0
 # To this limit fits are repeated, to see how far it moves them.
 _NARROW_LIMIT = 60.0
+# No instrument sees so many decades: what is less, relatively, is computed.
+_DARKEST = 1e-15
 # A shape of more parameters whose error is not less by this is the simpler one again.
 _SAME_SHAPE = 0.99
 # Of a fit that leaves less, relatively, nothing is left for another one to explain.
@@ -447,7 +449,10 @@ def _positive(name: str, samples: Measurements, model: BrdfModel) -> Measurement
     where = "as in the shadow of the detector"
     notes += note_of(lowest == 0, f"samples are exactly 0, {where}, and left out")
     notes += note_of(lowest < 0, "samples are negative and left out")
-    return replace(samples.select(lowest > 0), notes=notes)
+    dark = lowest <= _DARKEST * lowest.max()
+    text = f"samples are less than {_DARKEST:g} of the largest and left out"
+    notes += note_of(dark & (lowest > 0), text)
+    return replace(samples.select(~dark), notes=notes)
 
 
 def _channels(samples: Measurements) -> list[Measurements]:

@@ -25,6 +25,8 @@ FREE = {
     "mitsuba": {"--output"},
     "fit": {
         "--gamma",
+        "--noise",
+        "--uncertainty",
         "--angle",
         "--theta-i",
         "--phi-i",

@@ -180,7 +180,8 @@ def test_fit_prints_the_stored_number(files):
     assert roughness**2 == pytest.approx(alpha)
     assert (1 - gloss) ** 2 == pytest.approx(alpha)
     # α = r² and σ_α = 2 r σ_r.
-    error, of_roughness = (float(rows[name]["parameter_stderr"]) for name in ("ggx", "ggx:roughness"))
+    errors = (rows[name]["parameter_stderr"] for name in ("ggx", "ggx:roughness"))
+    error, of_roughness = map(float, errors)
     assert error > 0
     assert 2 * roughness * of_roughness == pytest.approx(error, rel=1e-6)
 

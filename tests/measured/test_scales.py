@@ -77,7 +77,7 @@ def test_values_many_decades_apart(tmp_path, lines, loss, decades):
     path = scan(tmp_path, lines(values))
     # Of more decades too few samples are left.
     is_whole = loss == "linear" and lines is one_angle
-    assert answered(path, "--loss", loss) == (is_whole or decades < 100)
+    assert answered(path, "--loss", loss) == (is_whole or decades < 200)
 
 
 @pytest.mark.parametrize("lines", [one_angle, two_angles])

@@ -327,7 +327,12 @@ def _is_again(one: MeasuredFit, other: MeasuredFit) -> bool:
 
 def ranked(fits: Sequence[MeasuredFit]) -> list[MeasuredFit]:
     """Return fits by their error at samples that were left out, the smallest first."""
-    return sorted(fits, key=lambda fit: fit.comparable_error)
+    return sorted(fits, key=_rank)
+
+
+def _rank(fit: MeasuredFit) -> tuple[bool, float]:
+    """Return what fits are ranked by: one that cannot be validated comes after all that can."""
+    return bool(np.isnan(fit.validated_error)), fit.comparable_error
 
 
 def recommended(fits: Sequence[MeasuredFit]) -> MeasuredFit:
@@ -337,8 +342,9 @@ def recommended(fits: Sequence[MeasuredFit]) -> MeasuredFit:
     renderers have, are simpler; of several still the one with the least error.
     """
     best = ranked(fits)[0]
-    limit = best.comparable_error + np.nan_to_num(best.validated_spread)
-    good = [fit for fit in fits if fit.comparable_error <= limit]
+    is_unknown, least = _rank(best)
+    limit = is_unknown, least + np.nan_to_num(best.validated_spread)
+    good = [fit for fit in fits if _rank(fit) <= limit]
     return min(good, key=lambda fit: (fit.size, not fit.distribution.smith, fit.comparable_error))
 
 

@@ -12,6 +12,7 @@ from itertools import compress
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdfconv.brdf.fresnel import normal_reflectance
 from mdfconv.distributions import Distribution
@@ -47,6 +48,8 @@ _DOUBLE_WIDTHS = 13
 _INSIDE = 1e-9
 # Nearer than this to an end of its range a coordinate is at the end.
 _AT_END = 1e-3
+# Of a coordinate, most a logarithm: a slope tells no more of a function so far away.
+_LARGEST_DEVIATION = 2.0
 # Robust weights are those of a point when it moves less than this.
 _SETTLED = 1e-4
 # The largest value of no surface is less.
@@ -55,6 +58,8 @@ _LEAST_BRDF = 1e-30
 _LEAST_ERROR = 1e-150
 # Of the largest value: what is smaller has no weight 1/value² in double precision.
 _SMALLEST_LOGARITHM = 1e-100
+# Standard deviations between which they have weights 1/σ².
+_DEVIATIONS = (1e-100, 1e100)
 _STEPS, _FIRST_STEPS, _POLISHING_STEPS = 60, 8, 4
 _SMALLEST_STEP = 1e-6
 _DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-4, 1e-12, 1e8
@@ -86,7 +91,8 @@ class MeasuredFit:
     parameters, errors : dict of str to float
         What was searched, by its names, and the standard errors: the distribution's parameter,
         ``"gamma"``, of two lobes ``"second"``, the parameter of the wider one, and ``"share"`` of
-        the narrower one, and ``"n"``, the index of refraction.
+        the narrower one, and ``"n"``, the index of refraction. NaN is the error of what the data
+        do not bound.
     linear, linear_errors : dict of str to tuple of float
         What was solved for, of each channel: ``"diffuse"`` (k_d), ``"f0"`` and ``"specular"``
         (k_s), or of one angle ``"offset"`` and ``"scale"``, and the standard errors.
@@ -386,6 +392,13 @@ def checked(lobe: Lobe) -> Lobe:
             "fit values of another unit with F = 1 and k_s free",
             argument="fresnel",
         )
+    deviations = lobe.deviations()
+    if deviations is not None and not _are_within(deviations, *_DEVIATIONS):
+        raise MdfconvError(
+            f"standard deviations between {deviations.min():.3g} and {deviations.max():.3g} are "
+            f"outside {_DEVIATIONS[0]:g} to {_DEVIATIONS[1]:g}",
+            "fit values of another unit, or without standard deviations",
+        )
     if lobe.transform() and values.min() <= _SMALLEST_LOGARITHM * largest:
         raise MdfconvError(
             "the smallest value is less than 1e-100 of the largest: no loss of logarithms holds "
@@ -393,6 +406,10 @@ def checked(lobe: Lobe) -> Lobe:
             "leave out what is no measurement, or take the linear loss",
         )
     return lobe
+
+
+def _are_within(values: Array, least: float, largest: float) -> bool:
+    return bool(values.min() >= least and values.max() <= largest)
 
 
 class Problem:
@@ -591,7 +608,8 @@ class Minimum:
         deviations = np.sqrt(np.diagonal(covariance))
         count = len(lobe.unknowns)
         slopes = [u.slope(x) for u, x in zip(lobe.unknowns, self.point, strict=True)]
-        errors = dict(zip(searched, (deviations[:count] * slopes).tolist(), strict=True))
+        known = np.where(self._is_bounded(deviations[:count]), deviations[:count], np.nan)
+        errors = dict(zip(searched, (known * slopes).tolist(), strict=True))
         columns = self.problem.unit * deviations[count:].reshape(len(channels), -1).T
         deviation = dict(zip(lobe.linear, columns, strict=True))
         if "specular_f0" in deviation:
@@ -657,12 +675,25 @@ class Minimum:
             "specular": deviation["specular"],
         }
 
+    def _is_bounded(self, deviations: Array) -> NDArray[np.bool_]:
+        """Return which coordinates the data bound, so that a standard error says something."""
+        low, high = self.problem.lobe.bounds
+        is_felt = (deviations > 0) | (self.cost == 0)
+        return (
+            is_felt
+            & (deviations < np.minimum(_LARGEST_DEVIATION, 0.5 * (high - low)))
+            & ~self._is_at_end()
+        )
+
+    def _is_at_end(self) -> NDArray[np.bool_]:
+        low, high = self.problem.lobe.bounds
+        return np.asarray(np.minimum(self.point - low, high - self.point) < _AT_END)
+
     def _at_limit(self) -> tuple[str, ...]:
         """Return the names of parameters at an end of their range; of a slice p has none."""
         lobe = self.problem.lobe
         first = 1 if isinstance(lobe, SliceLobe) else 0
-        low, high = lobe.bounds
-        is_near = np.minimum(self.point - low, high - self.point) < _AT_END
+        is_near = self._is_at_end()
         names = [unknown.name for unknown in lobe.unknowns]
         return tuple(compress(names[first:], is_near[first:]))
 

@@ -93,6 +93,13 @@ class BrdfModel:
                 raise MdfconvError(
                     f"the {name} {value:g} is outside 0 to {largest:g}", argument=name
                 )
+        if (self.noise, self.floor) != (None, None) and not (self.noise or self.floor):
+            given = "floor" if self.noise is None else "noise"
+            raise MdfconvError(
+                "a standard deviation of 0 is that of no measurement",
+                "give noise or floor above 0, or neither",
+                argument=given,
+            )
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -303,6 +310,10 @@ class Lobe(ABC):
     def scanned(self, mdf: Distribution, parameters: Array) -> Terms:
         """Return terms of a free strength for many parameters, which only have to find a start."""
 
+    def deviations(self) -> Array | None:
+        """Return the standard deviations of the values that weight them, if any."""
+        return None
+
     @abstractmethod
     def transform(self) -> Transform | None:
         """Return what the loss compares instead of values."""
@@ -422,9 +433,13 @@ class DirectionalLobe(Lobe):
         lobe *= at.v_cavity * factor / at.denominator
         return self._averaged(np.stack([np.full_like(lobe, 1 / np.pi), lobe], axis=-2), 0 * lobe)
 
+    def deviations(self) -> Array | None:
+        """Return those that options or samples have."""
+        return self.options.deviations(self.samples)
+
     def transform(self) -> Transform | None:
         """Return the logarithm or the cube root, if the loss is that."""
-        if self.options.deviations(self.samples) is not None:
+        if self.deviations() is not None:
             return None
         if self.options.loss == "log":
             return LOGARITHM
@@ -432,7 +447,7 @@ class DirectionalLobe(Lobe):
 
     def weight(self) -> Array:
         """Return the weights."""
-        deviations = self.options.deviations(self.samples)
+        deviations = self.deviations()
         if deviations is not None:
             return 1 / np.square(deviations.T)
         if self.options.loss == "cosine":

@@ -69,9 +69,10 @@ def validated(samples: Measurements, fit: MeasuredFit) -> MeasuredFit:
         outcomes.append((minimum, _error_at(whole.part(fold), minimum)))
     if len(outcomes) < 2:
         return fit
-    squares = np.square([error for _, error in outcomes])
-    mean = float(np.sqrt(squares.mean()))
-    spread = float(np.std([error for _, error in outcomes], ddof=1) / np.sqrt(len(outcomes)))
+    errors = np.array([error for _, error in outcomes])
+    unit = _unit(errors)
+    mean = unit * float(np.sqrt(np.mean(np.square(errors / unit))))
+    spread = unit * float(np.std(errors / unit, ddof=1) / np.sqrt(len(errors)))
     fit = replace(fit, validated_error=mean, validated_spread=spread)
     return _jackknifed(fit, [minimum for minimum, _ in outcomes]) if are_incidences else fit
 
@@ -101,12 +102,18 @@ def _folds(samples: Measurements) -> tuple[list[Indices], bool]:
         return [np.concatenate(groups[first:last]) for first, last in pairwise(ends)], True
     order = scan_order(samples)
     block = np.arange(len(order)) * min(_BLOCKS, len(order)) // len(order)
-    return [order[block % _BLOCK_FOLDS == fold] for fold in range(_BLOCK_FOLDS)], False
+    folds = [order[block % _BLOCK_FOLDS == fold] for fold in range(_BLOCK_FOLDS)]
+    return [fold for fold in folds if fold.size], False
 
 
 def _error_at(problem: Problem, minimum: Minimum) -> float:
     """Return the error of a fit at samples that it does not know."""
     return problem.at(minimum.point, minimum.projected.coefficients).error
+
+
+def _unit(values: Array) -> float:
+    """Return the largest of values, whose squares may be too large, for a unit."""
+    return float(np.abs(values).max()) or 1.0
 
 
 def _jackknifed(fit: MeasuredFit, minima: list[Minimum]) -> MeasuredFit:
@@ -115,7 +122,8 @@ def _jackknifed(fit: MeasuredFit, minima: list[Minimum]) -> MeasuredFit:
     count = len(minima)
 
     def deviation(values: list[Any]) -> Array:
-        return np.sqrt((count - 1) * np.var(np.array(values), axis=0))
+        unit = _unit(np.array(values))
+        return np.asarray(unit * np.sqrt((count - 1) * np.var(np.array(values) / unit, axis=0)))
 
     errors = {
         name: max(error, float(deviation([searched[name] for searched, _ in estimates])))

@@ -7,7 +7,6 @@ renderer couples the two, the diffuse colour is that which reflects k_d along th
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -22,6 +21,7 @@ from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.brdf_fit import MeasuredFit
+from mdfconv.measured.samples import wavelengths_of
 from mdfconv.measured.substitutes import LobePair, Substitute, lobe_pair, percent, substitute
 
 # The form of a parameter that renderers store.
@@ -49,7 +49,6 @@ _CONDUCTORS, _ROUNDING = 200, 1e-9
 # From which wavelengths, in nm, to below which others colours are averaged: red, green and blue.
 _BANDS = ((600, 701), (500, 600), (400, 500))
 _COLOURS = (("r", "red"), ("g", "green"), ("b", "blue"))
-_WAVELENGTH = re.compile(r"(\d+(?:\.\d+)?)\s*nm|^(\d{3,4}(?:\.\d+)?)$")
 
 
 @dataclass(frozen=True)
@@ -291,9 +290,9 @@ def _colours(channels: Sequence[str]) -> tuple[Sequence[Sequence[int]], str]:
     named = [[i for i in everything if names[i] in colour] for colour in _COLOURS]
     if len(names) == len(_COLOURS) and all(named):
         return named, ""
-    found = [_WAVELENGTH.search(name) for name in names]
-    waves = [float(match[1] or match[2]) if match else np.nan for match in found]
-    bands = [[i for i in everything if low <= waves[i] < high] for low, high in _BANDS]
+    known = wavelengths_of(channels)
+    waves = [] if known is None else known.tolist()
+    bands = [[i for i, wave in enumerate(waves) if low <= wave < high] for low, high in _BANDS]
     if all(bands):
         taken = "; ".join(" + ".join(channels[i] for i in band) for band in bands)
         return bands, f"Red, green and blue are the means of {taken}: not colorimetric."

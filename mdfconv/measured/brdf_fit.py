@@ -75,7 +75,13 @@ _STARTING_INDEX = 1.5
 # What reflects less along the normal is no metal, whichever approximation of F fits better.
 _DARKEST_METAL = 0.1
 # How an unknown is called beside the names of the distribution's own.
-_SYMBOLS = {"diffuse": "k_d", "f0": "F₀", "specular": "k_s", "specular_f0": "k_s F₀"}
+_SYMBOLS = {
+    "diffuse": "k_d",
+    "f0": "F₀",
+    "specular": "k_s",
+    "specular_f0": "k_s F₀",
+    "specular_rest": "k_s (1 − F₀)",
+}
 
 
 @dataclass(frozen=True)
@@ -245,9 +251,9 @@ class MeasuredFit:
         return lobe.terms(self.point).at(coefficients).T
 
     def _coefficient(self, name: str) -> tuple[float, ...]:
-        if name == "specular_f0":
-            pairs = zip(self.linear["specular"], self.linear["f0"], strict=True)
-            return tuple(specular * f0 for specular, f0 in pairs)
+        if name in ("specular_f0", "specular_rest"):
+            f0, specular = np.array(self.linear["f0"]), np.array(self.linear["specular"])
+            return tuple((specular * (f0 if name == "specular_f0" else 1 - f0)).tolist())
         return self.linear[name]
 
     def albedo(self, theta: float) -> Array:
@@ -586,9 +592,13 @@ class Minimum:
         columns = self.problem.unit * self.projected.coefficients.T
         linear = dict(zip(lobe.linear, columns, strict=True))
         if "specular_f0" in linear:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                f0 = linear.pop("specular_f0") / linear["specular"]
-            linear = {"diffuse": linear["diffuse"], "f0": f0, "specular": linear["specular"]}
+            normal, specular = (
+                linear["specular_f0"],
+                linear["specular_f0"] + linear["specular_rest"],
+            )
+            # A channel without a lobe reflects nothing.
+            f0 = normal / np.where(specular > 0, specular, 1)
+            linear = {"diffuse": linear["diffuse"], "f0": f0, "specular": specular}
         return searched, {name: tuple(column.tolist()) for name, column in linear.items()}
 
     def ordered(self) -> Minimum:
@@ -604,8 +614,7 @@ class Minimum:
             return ordered.report()
         lobe, channels = self.problem.lobe, self.problem.lobe.samples.channels
         searched, linear = self.estimates()
-        covariance, names = self._covariance()
-        deviations = np.sqrt(np.diagonal(covariance))
+        deviations, correlation, names = self._uncertainty()
         count = len(lobe.unknowns)
         slopes = [u.slope(x) for u, x in zip(lobe.unknowns, self.point, strict=True)]
         known = np.where(self._is_bounded(deviations[:count]), deviations[:count], np.nan)
@@ -613,12 +622,12 @@ class Minimum:
         columns = self.problem.unit * deviations[count:].reshape(len(channels), -1).T
         deviation = dict(zip(lobe.linear, columns, strict=True))
         if "specular_f0" in deviation:
-            deviation = self._of_quotient(deviation, linear)
+            deviation |= self._of_quotient(deviation, correlation[count:, count:])
+        deviation = {name: deviation[name] for name in linear}
         near = self.terms.at(self.projected.coefficients) * self.problem.unit
         values = lobe.samples.values.T
         unit = self.problem.unit if lobe.transform() is None else 1.0
         size = values.size
-        sizes = np.where(deviations > 0, deviations, 1)
         return MeasuredFit(
             what=lobe.what,
             distribution=lobe.distribution(self.point),
@@ -633,14 +642,14 @@ class Minimum:
             log_rmse=_log_rmse(near, values),
             bic=float(self.bic(self.problem.count) + 2 * size * np.log(unit)),
             unknowns=names,
-            correlation=covariance / (sizes[:, None] * sizes),
+            correlation=correlation,
             at_limit=self._at_limit(),
             weights=self.problem.robust,
             point=self.point,
         )
 
-    def _covariance(self) -> tuple[Array, tuple[str, ...]]:
-        """Return the covariance of coordinates and coefficients, and their names.
+    def _uncertainty(self) -> tuple[Array, Array, tuple[str, ...]]:
+        """Return deviations and correlation of coordinates and coefficients, and their names.
 
         Residuals of a scan resemble their neighbours: fewer of them are independent.
         """
@@ -660,19 +669,24 @@ class Minimum:
             for name in lobe.linear
         ]
         names = *(unknown.name for unknown in lobe.unknowns), *linear
-        return spread * inverse / (size[:, None] * size), names
+        # One after the other: a square of what the data do not tell may be too large.
+        root = np.sqrt(np.maximum(np.diagonal(inverse), 0))
+        divisor = np.where(root > 0, root, 1)
+        return np.sqrt(spread) * root / size, inverse / divisor[:, None] / divisor, names
 
-    def _of_quotient(
-        self, deviation: dict[str, Array], linear: dict[str, tuple[float, ...]]
-    ) -> dict[str, Array]:
-        """Return the deviations with that of F₀ = (k_s F₀)/k_s."""
-        specular, f0 = np.array(linear["specular"]), np.array(linear["f0"])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            of_f0 = np.hypot(deviation["specular_f0"], f0 * deviation["specular"]) / specular
+    def _of_quotient(self, deviation: dict[str, Array], correlation: Array) -> dict[str, Array]:
+        """Return the deviations of F₀ = a/(a + b) and k_s = a + b, from those of a and b."""
+        lobe, columns = self.problem.lobe, self.problem.unit * self.projected.coefficients.T
+        of_a, of_b = map(lobe.linear.index, ("specular_f0", "specular_rest"))
+        first = np.arange(columns.shape[1]) * len(lobe.linear)
+        shared = correlation[first + of_a, first + of_b]
+        a, da = columns[of_a], deviation["specular_f0"]
+        b, db = columns[of_b], deviation["specular_rest"]
+        total = np.where(a + b > 0, a + b, np.nan)
+        p, q = b * da / total, a * db / total
         return {
-            "diffuse": deviation["diffuse"],
-            "f0": of_f0,
-            "specular": deviation["specular"],
+            "f0": _root(p * p + q * q - 2 * shared * p * q) / total,
+            "specular": _root(da * da + db * db + 2 * shared * da * db),
         }
 
     def _is_bounded(self, deviations: Array) -> NDArray[np.bool_]:
@@ -696,6 +710,11 @@ class Minimum:
         is_near = self._is_at_end()
         names = [unknown.name for unknown in lobe.unknowns]
         return tuple(compress(names[first:], is_near[first:]))
+
+
+def _root(square: Array) -> Array:
+    """Return the square root of what only rounding makes negative."""
+    return np.sqrt(np.maximum(square, 0))
 
 
 def _rmse(near: Array, values: Array) -> float:

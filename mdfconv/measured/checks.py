@@ -34,6 +34,8 @@ _GOOD_NOISE = 0.1
 _GAIN, _TAILS = 0.2, 3.0
 # A free k_s gains nothing if so much of the error is left, and little if it explains less error.
 _NO_GAIN, _SMALL_GAIN = 0.95, 0.03
+# Of an exact fit, that ratios have one.
+_LEAST_ERROR = 1e-150
 # Where residuals are looked at, in degrees: of angles, and of distances from the mirror direction.
 _ANGLE_STEPS = np.arange(5.0, 90.0, 5.0)
 _MIRROR_STEPS = np.array([1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0])
@@ -236,11 +238,12 @@ def _two_lobes(fits: Sequence[MeasuredFit], fit: MeasuredFit, error: float) -> s
         return ""
     single, double = (min(group, key=lambda one: one.error) for group in (singles, doubles))
     single = single if fit.second is not None else fit
-    gain = double.error / single.error
+    gain = double.error / max(single.error, _LEAST_ERROR)
     if gain > 1 - _GAIN:
         return ""
     if fit.second is not None:
-        return f"The best single lobe, {single.label}, leaves {_percent(error / gain)}."
+        alone = _percent(error / max(gain, _LEAST_ERROR))
+        return f"The best single lobe, {single.label}, leaves {alone}."
     verb = "halve" if 0.4 <= gain <= 0.6 else "reduce"
     text = f"{_described(double)} would {verb} the error to {_percent(gain * error)}."
     return text[0].upper() + text[1:]
@@ -550,7 +553,7 @@ def _strength(fit: MeasuredFit, freed: MeasuredFit | None, error: float) -> Chec
     """Check that a lobe of another strength would not fit much better."""
     if freed is None or freed.specular is None:
         return None
-    gain = freed.error / fit.error
+    gain = freed.error / max(fit.error, _LEAST_ERROR)
     text = f"Freeing k_s (then {', '.join(f'{value:.2g}' for value in freed.specular)}) would "
     if gain > _NO_GAIN:
         return Check("strength", True, f"{text}gain nothing.")
@@ -561,7 +564,7 @@ def _strength(fit: MeasuredFit, freed: MeasuredFit | None, error: float) -> Chec
         return Check("strength", False, text, argument="values_are")
     if is_little or error <= _GOOD:
         return Check("strength", True, f"{text} only.")
-    if freed.f0 is not None and np.mean(freed.f0) > 1:
+    if freed.f0 is not None and np.mean(freed.f0) >= 1:
         text += ": F does not rise to 1 towards grazing as the model's does"
     else:
         text += ": the model, not the calibration, is in doubt"

@@ -252,7 +252,7 @@ class Lobe(ABC):
     @property
     def is_absolute(self) -> bool:
         """Whether the unit of the values matters: no coefficient stands for the lobe's strength."""
-        return not {"scale", "specular"} & set(self.linear)
+        return not {"scale", "specular", "specular_f0"} & set(self.linear)
 
     @property
     def bounds(self) -> Array:
@@ -414,8 +414,8 @@ class DirectionalLobe(Lobe):
         """Return the names of the coefficients that carry the strength of the lobe."""
         is_free = self.options.free_specular
         if self.fresnel == METAL:
-            # F₀ and k_s F₀ stand before the same function of the directions.
-            return ("specular_f0", "specular") if is_free else ("f0",)
+            # k_s F = k_s F₀ + k_s (1 − F₀) (1 − cos θ_d)⁵: linear in two that are not negative.
+            return ("specular_f0", "specular_rest") if is_free else ("f0",)
         return ("specular",) if is_free or self.fresnel == LOSSLESS else ()
 
     def _of_fresnel(self) -> tuple[Unknown, ...]:
@@ -483,10 +483,9 @@ class DirectionalLobe(Lobe):
         at, one = self._at, np.full_like(shape, 1 / np.pi)
         if self.fresnel == METAL:
             grazing = shape * at.schlick
-            normal = shape - grazing
             if self.options.free_specular:
-                return self._averaged(np.stack([one, normal, grazing]), np.zeros_like(shape))
-            return self._averaged(np.stack([one, normal]), grazing)
+                return self._averaged(np.stack([one, shape, grazing]), np.zeros_like(shape))
+            return self._averaged(np.stack([one, shape - grazing]), grazing)
         if self.fresnel == LOSSLESS:
             lobe = shape
         else:

@@ -228,8 +228,11 @@ def command(
         line = join(["mdfconv", *sys.argv[1:]])
         contents |= report_files(analyses, line, report, list(map(_sha256, files)))
     form = tables.form_of(format_, output)
-    rows = _rows(analyses, ends, separate=separate, for_people=form in ("table", "markdown"))
+    is_for_people = form in ("table", "markdown")
+    rows = _rows(analyses, ends, separate=separate, for_people=is_for_people)
     names = list(dict.fromkeys(name for row in rows for name in row))
+    if is_for_people:
+        names = [name for name in names if any(row.get(name) for row in rows)]
     rows = [{name: row.get(name) for name in names} for row in rows]
     title = f"Fits to {analyses[0].name}" if len(analyses) == 1 else "Fits"
     tables.write_table(
@@ -311,13 +314,14 @@ def _row_for_people(record: dict[str, Any]) -> dict[str, Any]:
         second, share = _measured(record, "second"), _measured(record, "share")
         row["parameter"] += f", {second}, share {share}"
     symbols = {"f0": "F₀", "n": "n", "diffuse": "k_d", "specular": "k_s"}
-    for name, symbol in symbols.items() | {("offset", "offset"), ("scale", "scale")}:
+    for name, symbol in (symbols | {"offset": "offset", "scale": "scale"}).items():
         if name in record:
             row[symbol] = _measured(record, name)
     is_relative = record["loss"] == "log"
     for name, heading in (("error", "error"), ("validated_error", "validated error")):
         value = record[name]
-        row[heading] = f"{100 * value:.3g} %" if is_relative else f"{value:.3g}"
+        unit = " σ" if record["loss"] == "sigma" else ""
+        row[heading] = f"{100 * value:.3g} %" if is_relative else f"{value:.3g}{unit}"
     return row
 
 

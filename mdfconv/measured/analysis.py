@@ -34,6 +34,7 @@ BRDF_LIMIT = 80.0
 _HORIZON = 90.0
 # To this limit fits are repeated, to see how far it moves them.
 _NARROW_LIMIT = 60.0
+_SHADOW = "samples are exactly 0, as in the shadow of the detector, and left out"
 # No instrument sees so many decades: what is less, relatively, is computed.
 _DARKEST = 1e-15
 # A shape of more parameters whose error is not less by this is the simpler one again.
@@ -233,7 +234,9 @@ def fit(
     Returns
     -------
     Analysis
-        The fits with standard errors, the recommended one, its verdict and checks.
+        ``results`` has one `ChannelFits`, or one for each channel: its ``recommended`` fit (with
+        ``parameter``, ``parameter_error``, ``f0``, ``n``, ``diffuse``), all ``fits``, the
+        ``verdict``, the ``checks``, and ``records()`` for files.
 
     Raises
     ------
@@ -257,6 +260,15 @@ def fit(
             f"no angles up to {max_angle:g} degrees", "above 0 and at most 90", argument="max_angle"
         )
     model = BrdfModel(**options)
+    if quantity is not None and isinstance(samples, DirectionalSamples):
+        raise MdfconvError(
+            f"{name}: values of two directions are a BRDF",
+            "leave out the quantity",
+            argument="quantity",
+        )
+    if samples.uncertainty is not None and (model.noise, model.floor) != (None, None):
+        note = "the uncertainties of the file are not used: noise and floor are given"
+        samples = replace(samples, notes=(*samples.notes, note))
     candidates = fitted_candidates(targets, gamma)
     used = _restricted(name, samples, quantity, max_angle)
     used = _positive(name, used, model)
@@ -446,14 +458,18 @@ def _positive(name: str, samples: Measurements, model: BrdfModel) -> Measurement
     No surface scatters nothing: there a detector is in the way of the light, or sees its own noise.
     """
     notes, lowest = samples.notes, samples.values.min(axis=1)
+    if model.deviations(samples) is not None and isinstance(samples, DirectionalSamples):
+        # What is known to be noise is no bias.
+        dark = lowest == 0
+        notes += note_of(dark, _SHADOW)
+        return replace(samples.select(~dark), notes=notes)
     if isinstance(samples, Samples) and model.loss != "log":
         notes += note_of(lowest < 0, "samples have a negative value and are fitted as they are")
         return replace(samples, notes=notes)
     if not (lowest > 0).any():
         reason = "no sample is positive in every channel: there is no lobe to fit"
         raise MdfconvError(f"{name}: {reason}")
-    where = "as in the shadow of the detector"
-    notes += note_of(lowest == 0, f"samples are exactly 0, {where}, and left out")
+    notes += note_of(lowest == 0, _SHADOW)
     notes += note_of(lowest < 0, "samples are negative and left out")
     dark = lowest <= _DARKEST * lowest.max()
     text = f"samples are less than {_DARKEST:g} of the largest and left out"

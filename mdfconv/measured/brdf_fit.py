@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from mdfconv.brdf.fresnel import normal_reflectance
 from mdfconv.distributions import Distribution
@@ -54,6 +55,8 @@ _LARGEST_DEVIATION = 2.0
 _SETTLED = 1e-4
 # The largest value of no surface is less.
 _LEAST_BRDF = 1e-30
+# The share of a normal distribution below one standard deviation.
+_ONE_SIGMA = 0.8413447460685429
 # Of an exact fit, whose logarithm is wanted.
 _LEAST_ERROR = 1e-150
 # Of the largest value: what is smaller has no weight 1/value² in double precision.
@@ -121,6 +124,8 @@ class MeasuredFit:
         Parameters at an end of their range.
     weights : numpy.ndarray, shape (n,)
         The robust weights of the samples, 1 for those that count fully.
+    loss : str
+        That of the options; ``"sigma"`` where uncertainties weight differences of values.
     validated_error, validated_spread : float
         The error at samples that were left out, and its standard error; NaN if not validated.
     """
@@ -142,6 +147,7 @@ class MeasuredFit:
     at_limit: tuple[str, ...]
     weights: Array = field(repr=False)
     point: Array = field(repr=False)
+    loss: str
     validated_error: float = float("nan")
     validated_spread: float = float("nan")
 
@@ -302,7 +308,7 @@ class MeasuredFit:
                 "specular_stderr": list(self.specular_error or ()),
             }
         return row | {
-            "loss": self.options.loss,
+            "loss": self.loss,
             "error": self.error,
             "validated_error": self.validated_error,
             "validated_spread": self.validated_spread,
@@ -646,6 +652,7 @@ class Minimum:
             at_limit=self._at_limit(),
             weights=self.problem.robust,
             point=self.point,
+            loss=lobe.loss,
         )
 
     def _uncertainty(self) -> tuple[Array, Array, tuple[str, ...]]:
@@ -659,8 +666,11 @@ class Minimum:
         size = np.sqrt(np.maximum(np.diagonal(matrix), np.finfo(float).tiny))
         inverse = np.linalg.pinv(matrix / (size[:, None] * size), hermitian=True)
         residual = self.projected.residual
-        spread = self.cost / max(1, residual.size - len(matrix))
+        free = max(1, residual.size - len(matrix))
+        spread = self.cost / free
         spread *= dependence(residual[:, scan_order(lobe.samples)])
+        # Of few samples the spread itself is uncertain.
+        spread *= float(stdtrit(free, _ONE_SIGMA)) ** 2
         channels = lobe.samples.channels
         places = channels if len(channels) > 1 else ("",)
         linear = [

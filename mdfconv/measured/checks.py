@@ -51,7 +51,12 @@ _MOST_REASONS = 2
 _BASE, _BRIGHT = 0.005, 0.1
 # F₀ of a metal is not less, that of a dielectric not more, and n of usual ones between these.
 _LEAST_METAL, _MOST_DIELECTRIC = 0.3, 0.1
-_USUAL_INDICES = (1.25, 1.9)
+_USUAL_INDICES = (1.3, 1.9)
+# More light than that along the normal is not an error of calibration.
+_IMPOSSIBLE = 1.1
+# Fewer samples for each unknown say little of their errors; of values that the noise makes negative
+# so many say that the diffuse part is of its size.
+_LEAST_SAMPLES, _MOST_NEGATIVE = 3, 0.02
 # α up to which a lobe is called glossy.
 _GLOSSY = 0.15
 # Values of channels that differ so much, relatively, are a colour.
@@ -64,6 +69,8 @@ _LEAST_STEPS, _LEAST_APERTURES = 4.0, 3.0
 _DRIFT = 0.2
 # It rises or falls if so much of the difference is that of the first and the last.
 _TREND = 0.8
+# And no step goes the other way by so much of it.
+_AGAINST = 0.25
 _CORRELATED = 0.95
 # Incidences from here on tell mirror direction and light apart, degrees.
 _OBLIQUE = 15.0
@@ -159,15 +166,24 @@ def verdict_of(
     if misfit > _GOOD:
         reasons.append(failed.get("incidences", ""))
     if error > _GOOD and misfit < 0.5 * error:
-        reasons.append(f"Most of it is noise of dark samples; {_percent(misfit)} is left beyond.")
+        reasons.append(
+            f"Much of it is noise of dark samples; without it the error is {_percent(misfit)}."
+        )
     if misfit > _WORTH_A_WORD:
         reasons.append(_where_it_fails(samples, square))
     typical = median(noise)
     size = f"an RMS error of {_percent(error)} ({len(samples.values)} samples"
     size += f", noise {_percent(typical)})" if np.isfinite(typical) else ")"
     lobe, is_single = _described(fit), fit.second is None
-    if misfit <= _USABLE:
-        grade = "good" if misfit <= _GOOD and not reasons[0] else "usable"
+    impossible = failed.get("energy", "") if "energy" in failed and _is_impossible(fit) else ""
+    if impossible:
+        grade = "poor"
+        start = f"No surface reflects so much: {impossible} {lobe[0].upper()}{lobe[1:]} "
+        start += f"{'leaves' if is_single else 'leave'} {size}."
+        reasons[0] = ""
+    elif misfit <= _USABLE:
+        is_good = misfit <= _GOOD and not reasons[0] and "samples" not in failed
+        grade = "good" if is_good else "usable"
         start = f"{_surface(fit)}, described by {lobe} with {size}."
     else:
         grade = "poor"
@@ -175,6 +191,11 @@ def verdict_of(
         start = f"{'No single lobe describes' if is_single else 'Two lobes do not describe'} {what}"
         start += f": {lobe} {'leaves' if is_single else 'leave'} {size}."
     return Verdict(grade, " ".join([start, *list(filter(None, reasons))[:_MOST_REASONS]]))
+
+
+def _is_impossible(fit: MeasuredFit) -> bool:
+    """Return whether a surface reflects more than it receives even along the normal."""
+    return float(np.max(fit.albedo(0.0))) > _IMPOSSIBLE
 
 
 def _misfit(samples: Measurements, log_ratio: Array, noise: Array, weights: Array) -> Array:
@@ -195,6 +216,8 @@ def _percent(share: float) -> str:
     number = 100 * share
     if 0 < number < 0.01:
         return "less than 0.01 %"
+    if number > 1e4:
+        return "more than 10000 %"
     return f"{number:.0f} %" if number >= 9.95 else f"{number:.2g} %"
 
 
@@ -356,7 +379,8 @@ def checks_of(
         _correlation(fit),
         _strength(fit, freed, error),
         _outliers(weights, np.abs(log_ratio).max(axis=1) > _BEYOND_NOISE * noise),
-        Check("left out", None, f"{'; '.join(left_out) or 'No sample is left out'}."),
+        _number_of_samples(samples, fit),
+        _left_out(left_out),
     ]
     return [check for check in checks if check is not None]
 
@@ -502,13 +526,39 @@ def _one_parameter(fit: MeasuredFit, by_incidence: Sequence[IncidenceFit]) -> Ch
     drifts = np.ptp(parameter) > uncertain and np.ptp(alpha) > _DRIFT * np.median(alpha)
     first, last = known[0], known[-1]
     change = last.parameter - first.parameter
-    if drifts and abs(change) >= _TREND * np.ptp(parameter):
+    # Steps the other way that are more than the errors are no trend.
+    against = np.max(-np.sign(change) * np.diff(parameter), initial=0)
+    is_trend = abs(change) >= _TREND * np.ptp(parameter) and against < _AGAINST * np.ptp(parameter)
+    if drifts and is_trend:
         text = f"{'rises' if change > 0 else 'falls'} from {_at(first)} to {_at(last)}"
     else:
         text = f"is between {_at(low)} and {_at(high)}"
     text = f"By angle of incidence {fit.distribution.parameter.symbol} {text}"
     text += ": one value does not hold for all" if drifts else ""
     return Check("incidences", not bool(drifts), f"{text}.")
+
+
+def _number_of_samples(samples: Measurements, fit: MeasuredFit) -> Check | None:
+    """Check that the samples are more than enough for the unknowns."""
+    count, unknowns = samples.values.size, len(fit.unknowns)
+    if count >= _LEAST_SAMPLES * unknowns:
+        return None
+    text = (
+        f"{count} values for {unknowns} unknowns: the errors, and the choice of a shape, are rough."
+    )
+    return Check("samples", False, text)
+
+
+def _left_out(texts: Sequence[str]) -> Check:
+    """Say what is left out, and warn of many negative values, which are noise."""
+    text = f"{'; '.join(texts) or 'No sample is left out'}."
+    for note in texts:
+        if "negative" in note:
+            count, _, whole, *_ = note.split()
+            if int(count) > _MOST_NEGATIVE * int(whole):
+                text += " What is left of dark samples is noise above 0: k_d is an upper bound."
+                return Check("left out", False, text)
+    return Check("left out", None, text)
 
 
 def _at(one: IncidenceFit) -> str:
@@ -575,7 +625,9 @@ def _outliers(weights: Array, is_beyond_noise: NDArray[np.bool_]) -> Check:
     """Check that few samples are far from the fit."""
     count = int(np.count_nonzero((weights < _OUTLYING) & is_beyond_noise))
     share = count / len(weights)
-    text = f"{count} of {len(weights)} samples ({_percent(share)}) are outliers and count less"
+    text = (
+        f"{count} of {len(weights)} samples ({_percent(share)}) lie far from the fit and count less"
+    )
     if share <= _MANY_OUTLIERS:
         return Check("outliers", True, f"{text}.")
-    return Check("outliers", False, f"{text}: so many are a misfit, not mistakes of a measurement.")
+    return Check("outliers", False, f"{text}: so many mean that the model does not fit there.")

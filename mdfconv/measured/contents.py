@@ -317,14 +317,19 @@ def _swatch(values: Sequence[float], channels: Sequence[str]) -> str:
 def _precision(result: ChannelFits) -> str:
     """Return what ± is, and how far choices move the parameter."""
     count = len(result.by_incidence)
-    texts = ["± is one standard error, of residuals that depend on their neighbours."]
+    residuals = "from the residuals, widened because neighbouring samples err alike"
+    texts = [f"± is one standard error, {residuals}."]
     if count > 1:
         texts = [
             f"± is one standard error: that of the jackknife over {count} angles of incidence, or "
             "that of the residuals where it is larger."
         ]
     fit = result.recommended
-    same = [choice.fit.parameter for choice in result.choices if choice.fit.name == fit.name]
+    same = [
+        choice.fit.parameter
+        for choice in result.choices
+        if choice.fit.name == fit.name and choice.fit.log_rmse < _MUCH_WORSE * fit.log_rmse
+    ]
     if len(same) > 1:
         symbol = fit.distribution.parameter.symbol
         low, high = (with_error(value, fit.parameter_error) for value in (min(same), max(same)))
@@ -337,12 +342,14 @@ def _legend(result: ChannelFits) -> str:
     texts = ["Dots: data.", f"Solid lines: {result.recommended.label}, recommended."]
     second = runner_up(result)
     if second:
-        texts.append(f"Dotted lines: {second.label}, the runner-up.")
+        texts.append(f"Dotted lines: {second.label}, the next best shape.")
     if np.isfinite(result.noise):
         texts.append(f"Grey: ± 2 standard deviations of the noise, {percent(result.noise)}.")
     return " ".join(texts)
 
 
+# A choice whose error is so many times as large says nothing of the parameter.
+_MUCH_WORSE = 1.5
 _MAIN = ("parameter", "γ", "F₀", "k_d", "k_s", "offset", "scale")
 
 
@@ -419,13 +426,15 @@ def _choices(result: ChannelFits) -> ReportTable:
     channels = result.samples.channels
     fits = [choice.fit for choice in result.choices]
     several = len({fit.name for fit in fits}) > 1
-    shown = [_MAIN.index(name) for name in ("parameter", "F₀", "k_d", "offset", "scale")]
+    names = ("parameter", "F₀", "k_d", "k_s", "offset", "scale")
+    shown = [_MAIN.index(name) for name in names]
     rows = []
     for choice in result.choices:
         cells = _main(choice.fit, channels)
         shape = choice.fit.label if several else ""
-        rows.append([choice.what, shape, *(cells[place] for place in shown)])
-    columns = ["choice", "shape", *(_MAIN[place] for place in shown)]
+        size = percent(choice.fit.log_rmse)
+        rows.append([choice.what, shape, *(cells[place] for place in shown), size])
+    columns = ["choice", "shape", *(_MAIN[place] for place in shown), "error of logarithms"]
     return _without_empty(ReportTable(columns, rows, 0 if rows else None))
 
 

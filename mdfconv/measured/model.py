@@ -255,6 +255,11 @@ class Lobe(ABC):
         return not {"scale", "specular", "specular_f0"} & set(self.linear)
 
     @property
+    def loss(self) -> str:
+        """The loss, ``"sigma"`` where uncertainties stand for it."""
+        return self.options.loss
+
+    @property
     def bounds(self) -> Array:
         """The least and the largest point, shape (2, unknowns)."""
         ends = [(u.coordinate(u.lower), u.coordinate(u.upper)) for u in self.unknowns]
@@ -417,6 +422,12 @@ class DirectionalLobe(Lobe):
             # k_s F = k_s F₀ + k_s (1 − F₀) (1 − cos θ_d)⁵: linear in two that are not negative.
             return ("specular_f0", "specular_rest") if is_free else ("f0",)
         return ("specular",) if is_free or self.fresnel == LOSSLESS else ()
+
+    @property
+    def loss(self) -> str:
+        """The loss, ``"sigma"`` where uncertainties stand for it."""
+        is_weighted = self.options.deviations(self.samples) is not None
+        return "sigma" if is_weighted else self.options.loss
 
     def _of_fresnel(self) -> tuple[Unknown, ...]:
         is_searched = self.fresnel == DIELECTRIC

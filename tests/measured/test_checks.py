@@ -365,8 +365,24 @@ def test_more_light_than_falls_on_a_surface_is_asked_for_its_unit():
     assert "π f_r" in check.text
     assert check.argument == "values_are"
     verdict = scan.verdict(checks=[check])
-    assert verdict.grade == "usable"
-    assert "More light leaves it than falls on it." in verdict.sentence
+    assert verdict.grade == "poor"
+    assert verdict.sentence.startswith("No surface reflects so much: The surface reflects 250 %")
+
+
+def test_few_samples_are_never_good():
+    scan = Scan()
+    few = [check for check in scan.checks().values() if check.name == "samples"]
+    assert not few
+    check = Check("samples", False, "5 values for 3 unknowns")
+    assert scan.verdict(checks=[check]).grade == "usable"
+
+
+def test_many_negative_values_are_noise():
+    for count, passed in ((1, None), (30, False)):
+        text = f"{count} of 100 samples are negative and left out"
+        check = Scan().checks(left_out=[text])["left out"]
+        assert check.passed is passed
+        assert ("upper bound" in check.text) == (passed is False)
 
 
 def test_a_little_more_light_is_a_matter_of_calibration():
@@ -389,7 +405,7 @@ def test_more_light_where_nothing_was_measured():
         ({"f0": (0.17,)}, False, "low for a metal: check the calibration"),
         ({"f0": (0.04,)}, True, "n = 1.5, though Schlick's"),
         ({"fresnel": "dielectric", "n": 1.5, "f0": (0.04,)}, True, "n = 1.5."),
-        ({"fresnel": "dielectric", "n": 2.23, "f0": (0.145,)}, False, "have 1.25 to 1.9"),
+        ({"fresnel": "dielectric", "n": 2.23, "f0": (0.145,)}, False, "have 1.3 to 1.9"),
     ],
 )
 def test_a_reflectance_is_that_of_a_material(fitted, passed, words):

@@ -31,7 +31,7 @@ _SHOWN = 3
 _BATCH = 500
 
 
-def fuzz(numbers, seed, end=float("inf")):
+def fuzz(numbers, seed, end=float("inf"), command=None):
     """Run cases; return how often each class of outcome came up, and examples of failures.
 
     Parameters
@@ -42,6 +42,8 @@ def fuzz(numbers, seed, end=float("inf")):
         Of the random choices: the same cases for the same one.
     end : float, optional
         When to stop, of `time.time`.
+    command : str, optional
+        The only command to run.
 
     Returns
     -------
@@ -55,8 +57,8 @@ def fuzz(numbers, seed, end=float("inf")):
                 break
             # A case can be had again by itself.
             choose = random.Random(f"{seed} {number}")
-            kind = CLI if choose.random() < _SHARE_OF_COMMANDS else API
-            name, case = kind.draw(choose)
+            kind = CLI if command or choose.random() < _SHARE_OF_COMMANDS else API
+            name, case = kind.draw(choose, *([command] if command else []))
             try:
                 with _within(_LONGEST):
                     outcome = kind.run(case)
@@ -112,12 +114,13 @@ def main():
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=600)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--command", help="run this command only, such as fit")
     chosen = parser.parse_args()
     start, outcomes, failures = time.time(), Counter(), {}
     first = range(0, chosen.cases, _BATCH)
     batches = [range(number, min(number + _BATCH, chosen.cases)) for number in first]
     with ProcessPoolExecutor(chosen.jobs) as pool:
-        run = partial(fuzz, seed=chosen.seed, end=start + chosen.seconds)
+        run = partial(fuzz, seed=chosen.seed, end=start + chosen.seconds, command=chosen.command)
         for some, failed in pool.map(run, batches):
             outcomes += some
             for outcome, examples in failed.items():

@@ -68,8 +68,10 @@ class _Command(TyperCommand):
             if error.argument not in options:
                 raise
             # The library speaks of its arguments; here they are options.
-            hint = f"{error.hint} ({options[error.argument]})"
-            raise MdfconvError(error.reason, hint) from None
+            option = f" ({options[error.argument]})"
+            if not error.hint:
+                raise MdfconvError(error.reason + option) from None
+            raise MdfconvError(error.reason, error.hint + option) from None
 
 
 def _is_number(text: str) -> bool:

@@ -360,8 +360,12 @@ def _ends(names: Sequence[str]) -> list[Endpoint]:
 
     if ALL in [name.strip().lower() for name in names]:
         return []
-    ends = (options.noted(endpoint(name)) for name in names if name != TWO_LOBES)
+    ends = (options.noted(endpoint(name)) for name in names if not _is_two_lobes(name))
     return list({end.label: end for end in ends}.values())
+
+
+def _is_two_lobes(name: str) -> bool:
+    return name.strip().lower() == TWO_LOBES
 
 
 def _targets(
@@ -371,7 +375,8 @@ def _targets(
     from mdfconv.measured.analysis import fitted_candidates
 
     named: list[Any] = list(dict.fromkeys(end.distribution for end in ends))
-    named += [TWO_LOBES] * (TWO_LOBES in names)
+    if ALL not in [name.strip().lower() for name in names]:
+        named += [TWO_LOBES] * any(map(_is_two_lobes, names))
     if named:
         return fitted_candidates(named, gamma)
     if gamma is not None:

@@ -413,13 +413,13 @@ def _reflectance(fit: MeasuredFit, error: float) -> Check | None:
     if fit.f0 is None or fit.fresnel not in ("metal", "dielectric"):
         return None
     strength = float(np.mean(fit.f0))
-    index = fit.n or (1 + np.sqrt(strength)) / (1 - np.sqrt(strength))
     numbers = f"F₀ = {', '.join(f'{value:.2g}' for value in fit.f0)}"
     least, largest = _USUAL_INDICES
     doubt = "check the calibration, or the peak is not resolved"
     if error > _USABLE:
         doubt = "the lobe does not fit, or its peak is not resolved"
     if fit.fresnel == "dielectric" or (strength < _MOST_DIELECTRIC and error <= _USABLE):
+        index = fit.n or (1 + np.sqrt(strength)) / (1 - np.sqrt(strength))
         text = f"{numbers} is that of a dielectric with n = {index:.3g}"
         passed = bool(least <= index <= largest)
         if not passed:

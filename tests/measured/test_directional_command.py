@@ -104,3 +104,26 @@ def test_standard_input(tmp_path):
     status, out, _ = run("fit", "-", "--to", "ggx", "--format", "plain", stdin=content)
     assert status == 0
     assert "ggx" in out
+
+
+def test_two_lobes_by_name(tmp_path):
+    """Among all they are one of many; their name has no case, as others'."""
+    path = write(tmp_path / "paint.csv", count=5)
+    line = ("fit", str(path), "--fresnel", "none", "--format", "json")
+    records = json.loads(run(*line, "--to", "GGX+ggx")[1])
+    assert [record["distribution"] for record in records] == ["ggx+ggx"]
+    everything = json.loads(run(*line)[1])
+    assert json.loads(run(*line, "--to", "ggx+ggx", "--to", "all")[1]) == everything
+
+
+@pytest.mark.parametrize(
+    ("words", "end"),
+    [
+        (["--aperture", "31"], "the aperture 31 is outside 0 to 30 (--aperture)"),
+        (["--floor", "0"], "give noise or floor above 0, or neither (--floor)"),
+    ],
+)
+def test_a_number_that_an_option_does_not_take(tmp_path, words, end):
+    status, out, err = run("fit", str(write(tmp_path / "paint.csv")), *words)
+    assert (status, out) == (2, "")
+    assert err.strip().endswith(end)

@@ -211,3 +211,12 @@ def test_the_albedo_is_the_integral(fresnel, theta):
     data = DirectionalSamples(incident, outgoing, np.ones((len(outgoing), 3)), THREE.channels)
     whole = 2 * np.pi * (expected(data, found) * outgoing[:, 2:]).mean(axis=0)
     np.testing.assert_allclose(found.albedo(theta), whole, rtol=2e-3)
+
+
+def test_a_reflectance_of_one_is_judged():
+    """No index of refraction has F₀ = 1."""
+    falling = SCAN.values * SCAN.outgoing[:, 2:] * SCAN.incident[:, 2:]
+    options = {"fresnel": "metal", "free_specular": True}
+    (result,) = fit(replace(SCAN, values=falling), ["ggx"], **options).results
+    assert result.recommended.f0 == (1.0,)
+    assert "F₀ = 1 is usual for a metal." in [check.text for check in result.checks]

@@ -13,7 +13,7 @@ from mdfconv.brdf.microfacet import MASKINGS, Microsurface, dot, reflect
 from mdfconv.brdf.reflection import microfacet
 from mdfconv.distributions import distribution
 from mdfconv.measured import DirectionalSamples, Samples
-from mdfconv.measured.checks import checks_of, verdict_of
+from mdfconv.measured.checks import Check, checks_of, verdict_of
 from mdfconv.measured.scans import albedo, estimate_noise, incidence_groups, noise_of
 from tests.measured.scans import grid, measured, vector
 

@@ -87,6 +87,10 @@ class BrdfModel:
         if self.masking not in MASKINGS:
             raise unknown_name("masking", self.masking, MASKINGS)
         _check_fresnel(self.fresnel)
+        if self.free_specular and self.fresnel == LOSSLESS:
+            raise MdfconvError(
+                "k_s is free already where F is 1", "leave it out", argument="free_specular"
+            )
         for name, largest in (("aperture", 30.0), ("noise", 1.0), ("floor", np.inf)):
             value = getattr(self, name)
             if value is not None and not 0 <= value <= largest:
@@ -123,6 +127,9 @@ def _check_fresnel(name: str) -> float | None:
         index = float(number) if head == "ior" else 0.0
     except ValueError:
         index = 0.0
+    if 0 < index <= 1:
+        reason = f"a surface of index {index:g} reflects nothing from outside"
+        raise MdfconvError(reason, "give an index above 1", argument="fresnel")
     if not 0 < index < np.inf:
         near = percent_hint(number)
         if near:

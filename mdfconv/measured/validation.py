@@ -144,7 +144,8 @@ def by_incidence(samples: Measurements, fit: MeasuredFit) -> list[IncidenceFit]:
     """
     what = fit.what if fit.what.is_double else LobeShape(fit.distribution)
     fresnel = LOSSLESS if fit.n is None else f"ior:{fit.n!r}"
-    options = replace(fit.options, fresnel=fresnel, free_specular=True)
+    is_free = fresnel != LOSSLESS
+    options = replace(fit.options, fresnel=fresnel, free_specular=is_free)
     alone = []
     for angle, group in _incidences(samples):
         try:

@@ -366,6 +366,13 @@ def test_unknown_options(options):
         BrdfModel(**options)
 
 
+def test_a_surface_that_reflects_nothing_and_a_strength_that_is_free_already():
+    with pytest.raises(MdfconvError, match="reflects nothing from outside"):
+        BrdfModel(fresnel="ior:0.5")
+    with pytest.raises(MdfconvError, match="k_s is free already"):
+        BrdfModel(fresnel="none", free_specular=True)
+
+
 @pytest.mark.parametrize("options", [{"aperture": -1}, {"noise": 2.0}, {"floor": float("nan")}])
 def test_options_out_of_range(options):
     with pytest.raises(MdfconvError, match="is outside 0 to"):

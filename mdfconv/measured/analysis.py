@@ -37,12 +37,14 @@ _NARROW_LIMIT = 60.0
 _SHADOW = "samples are exactly 0, as in the shadow of the detector, and left out"
 # No instrument sees so many decades: what is less, relatively, is computed.
 _DARKEST = 1e-15
+# A shape whose error is so many times the least cannot win, and is not validated.
+_HOPELESS = 3.0
 # A shape of more parameters whose error is not less by this is the simpler one again.
 _SAME_SHAPE = 0.99
 # Of a fit that leaves less, relatively, nothing is left for another one to explain.
 _EXACT = 1e-6
 # Candidates, and choices, are compared on so many samples at most.
-_MOST_SAMPLES = 5_000
+_MOST_SAMPLES = 3_000
 _SEED = 2
 
 
@@ -287,11 +289,14 @@ def _fitted(
 
     They compete on some of many samples; the recommended one is fitted to all.
     """
-    some = _some(samples)
+    some, patience = _some(samples), np.inf
     fits, errors = [], []
     for what in candidates:
         try:
-            fits.append(fit_distribution(some, what, model))
+            found = fit_distribution(some, what, model, patience=patience)
+            fits.append(found)
+            if not is_asked:
+                patience = min(patience, _HOPELESS * found.error)
         except MdfconvError as error:
             errors.append(error)
             if is_asked:
@@ -300,7 +305,8 @@ def _fitted(
         raise errors[0]
     if not is_asked:
         fits = distinct(fits)
-    fits = [validated(some, one) for one in fits]
+    limit = _HOPELESS * min(one.error for one in fits)
+    fits = [one if one.error > limit and not is_asked else validated(some, one) for one in fits]
     chosen = recommended(fits)
     if some is not samples:
         whole = validated(samples, refitted(samples, chosen))
@@ -467,7 +473,11 @@ def _positive(name: str, samples: Measurements, model: BrdfModel) -> Measurement
         notes += note_of(lowest < 0, "samples have a negative value and are fitted as they are")
         return replace(samples, notes=notes)
     if not (lowest > 0).any():
-        reason = "no sample is positive in every channel: there is no lobe to fit"
+        empty = samples.values.max(axis=0) <= 0
+        which = "in every channel"
+        if empty.any() and not empty.all():
+            which = f"in channel {samples.channels[int(np.argmax(empty))]}"
+        reason = f"no sample is positive {which}: there is no lobe to fit"
         raise MdfconvError(f"{name}: {reason}")
     notes += note_of(lowest == 0, _SHADOW)
     notes += note_of(lowest < 0, "samples are negative and left out")

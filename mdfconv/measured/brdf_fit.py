@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from mdfconv.brdf.fresnel import normal_reflectance
 from mdfconv.distributions import Distribution
@@ -55,8 +54,6 @@ _LARGEST_DEVIATION = 2.0
 _SETTLED = 1e-4
 # The largest value of no surface is less.
 _LEAST_BRDF = 1e-30
-# The share of a normal distribution below one standard deviation.
-_ONE_SIGMA = 0.8413447460685429
 # Of an exact fit, whose logarithm is wanted.
 _LEAST_ERROR = 1e-150
 # Of the largest value: what is smaller has no weight 1/value² in double precision.
@@ -324,10 +321,12 @@ def fit_distribution(
     model: BrdfModel | None = None,
     *,
     gamma: float | None = None,
+    patience: float = np.inf,
 ) -> MeasuredFit:
     """Fit one distribution to samples, all channels with one lobe.
 
-    γ of a distribution that has one is free unless it is given; the others do not ask for it.
+    γ of a distribution that has one is free unless it is given; the others do not ask for it. The
+    robust weights of a fit whose error exceeds `patience` are left as they are after two passes.
     Raises `MdfconvError` if there are fewer samples than unknowns, nothing to fit, or γ is illegal.
     """
     options, what = model or BrdfModel(), candidate(target, gamma)
@@ -356,7 +355,8 @@ def fit_distribution(
         minima.append(_robust(minimum, passes=_FIRST_PASSES))
     plausible = [minimum for minimum in minima if minimum.is_plausible] or minima
     found = min(plausible, key=lambda minimum: minimum.bic(first.count))
-    found = _robust(found, passes=_ROBUST_PASSES)
+    if found.error <= patience:
+        found = _robust(found, passes=_ROBUST_PASSES)
     if some is not first:
         whole = first.with_fresnel(found.problem.lobe.fresnel)
         found = _robust(whole.evaluated(found.point), passes=_LAST_PASSES)
@@ -513,7 +513,9 @@ class Problem:
         terms = self.lobe.terms(point)
         return Minimum(self, point, terms, self._project(terms, coefficients, steps=0))
 
-    def descend(self, start: Array, *, steps: int = _STEPS) -> Minimum:
+    def descend(
+        self, start: Array, *, steps: int = _STEPS, smallest: float = _SMALLEST_STEP
+    ) -> Minimum:
         """Return the minimum near a point (Levenberg 1944, Marquardt 1963)."""
         low, high = self.lobe.bounds
         now = self.evaluated(np.clip(start, low + _INSIDE, high - _INSIDE))
@@ -540,7 +542,7 @@ class Problem:
                 damping *= 10
             step = np.abs(following.point - now.point).max(initial=0.0)
             now = following
-            if step < _SMALLEST_STEP:
+            if step < smallest:
                 break
         return now
 
@@ -670,7 +672,7 @@ class Minimum:
         spread = self.cost / free
         spread *= dependence(residual[:, scan_order(lobe.samples)])
         # Of few samples the spread itself is uncertain.
-        spread *= float(stdtrit(free, _ONE_SIGMA)) ** 2
+        spread *= student_quantile(free) ** 2
         channels = lobe.samples.channels
         places = channels if len(channels) > 1 else ("",)
         linear = [
@@ -725,6 +727,14 @@ class Minimum:
 def _root(square: Array) -> Array:
     """Return the square root of what only rounding makes negative."""
     return np.sqrt(np.maximum(square, 0))
+
+
+def student_quantile(free: int) -> float:
+    """Return what one standard deviation is in Student's t (Abramowitz & Stegun 26.7.5).
+
+    Of one degree of freedom within 1.5 %, of two within 0.1 %.
+    """
+    return 1 + 0.5 / free + 0.25 / free**2 + 0.0625 / free**3
 
 
 def _rmse(near: Array, values: Array) -> float:

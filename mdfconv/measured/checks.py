@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from mdfconv.brdf.microfacet import dot, mirrored, polar_angle
 from mdfconv.distributions.evaluation import Array, Indices
@@ -505,7 +505,8 @@ def _peak(samples: DirectionalSamples) -> tuple[float, float]:
     apart, values = apart[order], values[order]
     step = np.min(apart[apart > _SAME_DIRECTION], initial=np.inf)
     # A single low value is an outlier.
-    is_below = median_filter(values, 5, mode="nearest") < 0.5 * values.max()
+    windows = sliding_window_view(np.pad(values, 2, mode="edge"), 5)
+    is_below = np.median(windows, axis=1) < 0.5 * values.max()
     return float(step), float(np.min(apart[is_below], initial=np.inf))
 
 

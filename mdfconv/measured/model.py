@@ -165,8 +165,12 @@ def candidate(target: str | Distribution | LobeShape, gamma: float | None = None
 
 
 def all_candidates() -> list[LobeShape]:
-    """Return each shape once: no distribution that is another one in another parameter."""
+    """Return each shape once: no distribution that is another one in another parameter.
+
+    The usual ones, whose masking has a closed form, come first.
+    """
     shapes = [mdf for mdf in one_parameter_distributions() if not _is_another(mdf)]
+    shapes.sort(key=lambda mdf: not mdf.smith)
     return [*map(candidate, shapes), candidate(TWO_LOBES)]
 
 

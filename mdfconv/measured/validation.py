@@ -25,6 +25,8 @@ _MOST_FOLDS = 8
 # Of one incidence: folds of blocks that follow each other.
 _BLOCKS, _BLOCK_FOLDS = 25, 5
 _STEPS = 8
+# Of a parameter's errors less does not matter.
+_SMALLEST_STEP = 1e-4
 _SEED = 1
 
 
@@ -63,7 +65,7 @@ def validated(samples: Measurements, fit: MeasuredFit) -> MeasuredFit:
         rest = whole.part(np.setdiff1d(everything, fold, assume_unique=True))
         try:
             checked(rest.lobe)
-            minimum = rest.descend(fit.point, steps=_STEPS)
+            minimum = rest.descend(fit.point, steps=_STEPS, smallest=_SMALLEST_STEP)
         except MdfconvError:
             continue
         outcomes.append((minimum, _error_at(whole.part(fold), minimum)))

@@ -193,7 +193,7 @@ def test_on_the_command_line(tmp_path, header, way):
     assert status == 2
     assert "give the angle of incidence (--incidence)" in err
     assert err.count("\n") == 1
-    words = "--to", "ggx", "--masking", "none", "--format", "json"
+    words = "--to", "ggx", "--fresnel", "none", "--format", "json"
     status, out, err = run("fit", path, *words, *way)
     assert status == 0, err
     assert json.loads(out)[0]["parameter"] == pytest.approx(0.1, rel=1e-4)

@@ -178,8 +178,7 @@ def verdict_of(
     impossible = failed.get("energy", "") if "energy" in failed and _is_impossible(fit) else ""
     if impossible:
         grade = "poor"
-        start = f"No surface reflects so much: {impossible} {lobe[0].upper()}{lobe[1:]} "
-        start += f"{'leaves' if is_single else 'leave'} {size}."
+        start = f"No surface reflects so much: {impossible} The fit by {lobe} has {size}."
         reasons[0] = ""
     elif misfit <= _USABLE:
         is_good = misfit <= _GOOD and not reasons[0] and "samples" not in failed

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from mdfconv.measured import Analysis, ReadOptions
     from mdfconv.measured.model import LobeShape
 
-# The name of the mixture of two lobes, as `mdfconv.measured.model` has it.
-TWO_LOBES = "ggx+ggx"
 # What a narrow terminal leaves out first, from the end.
 _SECONDARY = ("k_s", "n", "validated error", "F₀")
 # What may make right what a check finds, by the argument that it names.
@@ -365,6 +363,8 @@ def _ends(names: Sequence[str]) -> list[Endpoint]:
 
 
 def _is_two_lobes(name: str) -> bool:
+    from mdfconv.measured.model import TWO_LOBES
+
     return name.strip().lower() == TWO_LOBES
 
 
@@ -373,6 +373,7 @@ def _targets(
 ) -> list[LobeShape] | None:
     """Return the candidates to fit, None for all, and say which of all a given γ leaves out."""
     from mdfconv.measured.analysis import fitted_candidates
+    from mdfconv.measured.model import TWO_LOBES
 
     named: list[Any] = list(dict.fromkeys(end.distribution for end in ends))
     if ALL not in [name.strip().lower() for name in names]:

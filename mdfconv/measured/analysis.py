@@ -25,7 +25,7 @@ from mdfconv.measured.model import (
     all_candidates,
     candidate,
 )
-from mdfconv.measured.samples import DirectionalSamples, Measurements, Samples, note_of
+from mdfconv.measured.samples import DirectionalSamples, Measurements, Samples, note_of, some_rows
 from mdfconv.measured.scans import median, noise_of
 from mdfconv.measured.validation import IncidenceFit, by_incidence, validated
 
@@ -429,11 +429,8 @@ def _choices(result: ChannelFits) -> list[Choice]:
 
 def _some(samples: Measurements) -> Measurements:
     """Return some of the samples if there are many."""
-    count = len(samples.values)
-    if count <= _MOST_SAMPLES:
-        return samples
-    index = np.random.default_rng(_SEED).choice(count, _MOST_SAMPLES, replace=False)
-    return samples.select(np.sort(index))
+    index = some_rows(np.random.default_rng(_SEED), len(samples.values), _MOST_SAMPLES)
+    return samples if index is None else samples.select(index)
 
 
 def _restricted(

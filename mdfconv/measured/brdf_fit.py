@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mdfconv.brdf.fresnel import normal_reflectance
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.evaluation import Array, Indices
+from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured import projection
 from mdfconv.measured.model import (
@@ -32,8 +32,8 @@ from mdfconv.measured.model import (
     lobe_at,
 )
 from mdfconv.measured.projection import Projected, Projection, Terms
-from mdfconv.measured.samples import DirectionalSamples, Measurements, Samples
-from mdfconv.measured.scans import albedo, dependence, scan_order
+from mdfconv.measured.samples import DirectionalSamples, Measurements, Samples, some_rows
+from mdfconv.measured.scans import MEDIANS, albedo, dependence, scan_order
 
 # Samples of a scan for starts, and those on which a start is followed.
 _SCANNED, _FIRST_FITTED = 600, 3_000
@@ -68,8 +68,6 @@ _SEED = 0
 # Huber 1964: linear beyond so many standard deviations, which costs 5 % of the efficiency.
 _HUBER = 1.345
 _FIRST_PASSES, _ROBUST_PASSES, _LAST_PASSES = 2, 4, 2
-# The standard deviation in medians of absolute deviations.
-_MEDIANS = 1.4826
 # The index with which a search for one begins.
 _STARTING_INDEX = 1.5
 # What reflects less along the normal is no metal, whichever approximation of F fits better.
@@ -338,9 +336,9 @@ def fit_distribution(
     kinds = (LOSSLESS,) if is_slice else options.kinds
     first = Problem(checked(lobe_at(samples, what, options, kinds[0])))
     random = np.random.default_rng(_SEED)
-    index = _some(random, len(samples.values), _FIRST_FITTED)
+    index = some_rows(random, len(samples.values), _FIRST_FITTED)
     some = first.part(index)
-    few = some.part(_some(random, some.count, _SCANNED))
+    few = some.part(some_rows(random, some.count, _SCANNED))
     starts = [few.extended(start) for start in few.starts()]
     start = starts[0]
     if len(starts) > 1:
@@ -367,11 +365,6 @@ def refitted(samples: Measurements, fit: MeasuredFit) -> MeasuredFit:
     """Return the fit to more samples of the same surface, near which it is."""
     problem = Problem(lobe_at(samples, fit.what, fit.options, fit.fresnel or LOSSLESS))
     return _robust(problem.evaluated(fit.point), passes=_LAST_PASSES).report()
-
-
-def _some(random: np.random.Generator, count: int, most: int) -> Indices | None:
-    """Return the indices of some samples, in order; None for all."""
-    return np.sort(random.choice(count, most, replace=False)) if count > most else None
 
 
 def _robust(minimum: Minimum, passes: int) -> Minimum:
@@ -461,7 +454,7 @@ class Problem:
         if not self.lobe.options.robust:
             return self
         residual = np.abs(minimum.projected.residual).max(axis=0) / np.sqrt(minimum.problem.robust)
-        spread = _MEDIANS * float(np.median(residual)) or 1.0
+        spread = MEDIANS * float(np.median(residual)) or 1.0
         weights = np.minimum(1, _HUBER * spread / np.maximum(residual, 1e-300))
         return Problem(self.lobe, weights, self.unit)
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdfconv.brdf.microfacet import direction, half_vector
-from mdfconv.distributions.evaluation import Array
+from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.errors import MdfconvError
 
 # What a file says of itself: for a title.
@@ -286,6 +286,11 @@ def about_of(lines: Iterable[str]) -> tuple[str, ...]:
         if len(told) == MOST_ABOUT:
             break
     return tuple(told)
+
+
+def some_rows(random: np.random.Generator, count: int, most: int) -> Indices | None:
+    """Return the indices of some of so many samples, in order; None for all."""
+    return np.sort(random.choice(count, most, replace=False)) if count > most else None
 
 
 def note_of(dropped: NDArray[np.bool_], what: str) -> tuple[str, ...]:

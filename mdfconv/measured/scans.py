@@ -16,7 +16,7 @@ from mdfconv.measured.samples import DirectionalSamples, Measurements
 _SAME_ANGLE = 0.5
 
 # The standard deviation in medians of absolute deviations.
-_MEDIANS = 1.4826
+MEDIANS = 1.4826
 # A sample between two neighbours is the least that shows noise.
 _FEWEST = 3
 # Levels of brightness at which noise is estimated, and the least differences of one.
@@ -80,11 +80,6 @@ def incidence_groups(samples: DirectionalSamples) -> list[tuple[float, Indices]]
     return [(float(np.median(ascending[a:b])), np.sort(order[a:b])) for a, b in spans]
 
 
-def estimate_noise(samples: Measurements, log_ratio: Array) -> float:
-    """Return the median of `noise_of`; NaN of too few samples."""
-    return median(noise_of(samples, log_ratio))
-
-
 def median(values: Array) -> float:
     """Return the median of what is finite; NaN of nothing."""
     known = values[np.isfinite(values)]
@@ -137,7 +132,7 @@ def noise_of(samples: Measurements, log_ratio: Array) -> Array:
         np.argsort(light, kind="stable"), np.clip(light.size // _PER_LEVEL, 1, _LEVELS)
     )
     level = np.array([np.median(light[part]) for part in parts])
-    noise = _MEDIANS * np.array([np.median(apart[part]) for part in parts])
+    noise = MEDIANS * np.array([np.median(apart[part]) for part in parts])
     upper = noise[noise.size // 2 :]
     np.minimum(upper, np.median(noise), out=upper)
     # Beyond the darkest level the noise of the detector stays as it is.

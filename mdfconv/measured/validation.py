@@ -16,7 +16,7 @@ from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.brdf_fit import MeasuredFit, Minimum, Problem, checked, fit_distribution
 from mdfconv.measured.model import LOSSLESS, LobeShape, lobe_at
-from mdfconv.measured.samples import DirectionalSamples, Measurements
+from mdfconv.measured.samples import DirectionalSamples, Measurements, some_rows
 from mdfconv.measured.scans import incidence_groups, scan_order
 
 # Samples of more are not refitted; folds of more incidences are of several.
@@ -82,13 +82,10 @@ def validated(samples: Measurements, fit: MeasuredFit) -> MeasuredFit:
 def _problem(samples: Measurements, fit: MeasuredFit) -> Problem:
     """Return the problem of a fit, on some of the samples if there are many."""
     lobe = lobe_at(samples, fit.what, fit.options, fit.fresnel or LOSSLESS)
-    weights = fit.weights
-    count = len(weights)
-    if count <= _MOST_SAMPLES:
-        return Problem(lobe, weights)
-    index = np.random.default_rng(_SEED).choice(count, _MOST_SAMPLES, replace=False)
-    index.sort()
-    return Problem(lobe.part(index), weights[index])
+    index = some_rows(np.random.default_rng(_SEED), len(fit.weights), _MOST_SAMPLES)
+    if index is None:
+        return Problem(lobe, fit.weights)
+    return Problem(lobe.part(index), fit.weights[index])
 
 
 def _incidences(samples: Measurements) -> list[tuple[float, Indices]]:

@@ -14,10 +14,15 @@ from mdfconv.brdf.reflection import microfacet
 from mdfconv.distributions import distribution
 from mdfconv.measured import DirectionalSamples, Samples
 from mdfconv.measured.checks import Check, checks_of, verdict_of
-from mdfconv.measured.scans import albedo, estimate_noise, incidence_groups, noise_of
+from mdfconv.measured.scans import albedo, incidence_groups, median, noise_of
 from tests.measured.scans import grid, measured, vector
 
 INCIDENCES = (20.0, 45.0, 70.0)
+
+
+def estimate_noise(samples, log_ratio):
+    """Return the noise of most samples, as a verdict has it."""
+    return median(noise_of(samples, log_ratio))
 
 
 def directional(angles, values=None):

@@ -27,8 +27,8 @@ class CubicSlope(Distribution):
     printed = Printed(printed, lambda scale: 1 / (np.pi * scale**2))
     operations = 9
 
-    def _lobe(self, beta, parameter, out=None):
-        square = np.square(np.tan(beta))
+    def _lobe(self, angles, parameter, out=None):
+        square = angles.tangent_square
         value = np.square(1 + square) / (1 + square / (2 * parameter * parameter)) ** 3
         if out is None:
             return value
@@ -38,15 +38,15 @@ class CubicSlope(Distribution):
     def _at_normal(self, parameter):
         return 1 / (np.pi * parameter * parameter)
 
-    def _lobe_and_log_slope(self, beta, parameter):
-        x = np.square(np.tan(beta) / parameter) / 2
-        return self._lobe(beta, parameter), 6 * x / (1 + x)
+    def _lobe_and_log_slope(self, angles, parameter):
+        x = np.square(angles.tangent / parameter) / 2
+        return self._lobe(angles, parameter), 6 * x / (1 + x)
 
     def _log_slope_at_normal(self, parameter):
         return np.full_like(parameter, -2)
 
-    def _cumulative(self, beta, parameter):
-        x = np.square(np.tan(beta) / parameter) / 2
+    def _cumulative(self, angles, parameter):
+        x = np.square(angles.tangent / parameter) / 2
         return x * (2 + x) / np.square(1 + x), 1 / np.square(1 + x)
 
 
@@ -61,23 +61,23 @@ class PowerSlope(CubicSlope):
         Parameter("power", "k", (3.0, 9.0), 2.5, default=3.0, fit_range=(2.6, 40.0)),
     )
 
-    def _x(self, beta, parameter):
-        return np.square(np.tan(beta) / parameter) / (self.gamma - 1)
+    def _x(self, angles, parameter):
+        return np.square(angles.tangent / parameter) / (self.gamma - 1)
 
-    def _lobe(self, beta, parameter, out=None):
-        value = np.square(1 + np.square(np.tan(beta)))
-        value = value * (1 + self._x(beta, parameter)) ** -self.gamma
+    def _lobe(self, angles, parameter, out=None):
+        value = np.square(1 + angles.tangent_square)
+        value = value * (1 + self._x(angles, parameter)) ** -self.gamma
         if out is None:
             return value
         out[...] = value
         return out
 
-    def _lobe_and_log_slope(self, beta, parameter):
-        x = self._x(beta, parameter)
-        return self._lobe(beta, parameter), 2 * self.gamma * x / (1 + x)
+    def _lobe_and_log_slope(self, angles, parameter):
+        x = self._x(angles, parameter)
+        return self._lobe(angles, parameter), 2 * self.gamma * x / (1 + x)
 
-    def _cumulative(self, beta, parameter):
-        tail = (1 + self._x(beta, parameter)) ** (1 - self.gamma)
+    def _cumulative(self, angles, parameter):
+        tail = (1 + self._x(angles, parameter)) ** (1 - self.gamma)
         return 1 - tail, tail
 
     printed = Printed(

@@ -51,7 +51,7 @@ def test_fits_are_found_in_their_package():
 def test_both_forms_of_a_distribution_name_their_options():
     for form in (mdfconv.Distribution.unit, mdfconv.Distribution.normalized):
         names = list(inspect.signature(form).parameters)
-        assert names == ["self", "beta", "parameter", "phi", "gamma", "threads"]
+        assert names == ["self", "beta", "parameter", "phi", "gamma", "variable", "threads"]
 
 
 @pytest.mark.parametrize("name", CALLABLE)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdfconv.distributions import Distribution
+from mdfconv.distributions.base import Variable
 from mdfconv.distributions.endpoint import follow, to_root
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
@@ -131,14 +132,19 @@ class Microsurface:
 
     def at_angle(self, theta: Array, phi: Array | None = None) -> Array:
         """Return D at angles from the surface normal, [0, π/2], and azimuths if it has a pair."""
-        form = self.distribution.normalized if self.normalized else self.distribution.unit
-        return np.asarray(form(theta, self.parameter, phi=phi))
+        return self._at(theta, phi, "angle")
 
     def density(self, m: Array) -> Array:
         """Return D at microfacet normals, shape (..., 3); 0 below the surface."""
-        theta = np.minimum(polar_angle(m), np.pi / 2)
+        x, y, z = np.moveaxis(m, -1, 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = np.where(z > 0, np.hypot(x, y) / z, np.inf)
         phi = azimuth(m) if isinstance(self.parameter, tuple) else None
-        return np.where(m[..., 2] > 0, self.at_angle(theta, phi), 0)
+        return np.where(z > 0, self._at(slope, phi, "slope"), 0)
+
+    def _at(self, angles: Array, phi: Array | None, variable: Variable) -> Array:
+        form = self.distribution.normalized if self.normalized else self.distribution.unit
+        return np.asarray(form(angles, self.parameter, phi=phi, variable=variable))
 
     def smith_lambda(self, omega: Array) -> Array:
         """Return Smith's Λ for directions.

@@ -7,11 +7,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, ClassVar, Self, TypedDict, Unpack, overload
+from typing import Any, ClassVar, Literal, Self, TypeAlias, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mdfconv.distributions.angles import VARIABLES, Angles
 from mdfconv.distributions.evaluation import Array, Kernel, as_operand, computing_dtype, evaluate
 from mdfconv.distributions.parameter import Encoding, Parameter, number_text
 from mdfconv.distributions.smith import SmithTable, smith_table
@@ -107,11 +108,16 @@ BOUNDED_ALPHA_MAP = replace(
 )
 
 
+# What `beta` of `Distribution.unit` and `Distribution.normalized` may hold: β, cos β or tan β.
+Variable: TypeAlias = Literal["angle", "cosine", "slope"]
+
+
 class Options(TypedDict, total=False):
     """The options of `Distribution.unit` and `Distribution.normalized`."""
 
     phi: ArrayLike | None
     gamma: ArrayLike | None
+    variable: Variable
     threads: int
 
 
@@ -136,8 +142,8 @@ class Distribution(ABC):
     """A microfacet distribution function of one parameter, or of two.
 
     A subclass declares what is true of it (names, parameters, sources and what the class
-    attributes below say) and gives elementwise kernels: `_lobe`, the distribution over its value
-    at the normal, D(β)/D(0); `_at_normal`, D(0) of the normalized form, for which
+    attributes below say) and gives elementwise kernels of `Angles`: `_lobe`, the distribution over
+    its value at the normal, D(β)/D(0); `_at_normal`, D(0) of the normalized form, for which
     ∫ D cos β dω = 1 over the hemisphere; the slopes of both, for fits; and `_cumulative`. Where
     the maximum is not at the normal it gives `_off_axis_maximum` too. Widths and quantiles have
     numerical defaults; a subclass that knows a closed form overrides them.
@@ -277,6 +283,7 @@ class Distribution(ABC):
         *,
         phi: ArrayLike | None = None,
         gamma: ArrayLike | None = None,
+        variable: Variable = "angle",
         threads: int = 1,
     ) -> Any:
         """Evaluate the unit form D̄ = D / max D.
@@ -293,6 +300,11 @@ class Distribution(ABC):
             Azimuth of the half vector from the x axis, radians; only with a pair.
         gamma : array_like, optional
             The second parameter, of a distribution that has one; by default `self.gamma`.
+        variable : {"angle", "cosine", "slope"}, optional
+            What `beta` holds: the angle, its cosine n·h, or its tangent. A cosine is quicker than
+            an angle and has lost digits near the normal: what float64 stores as 1 is any angle up
+            to 1e-8, float32 up to 2.4e-4. So it suits lobes that are much wider. A slope, which is
+            √(x² + y²)/z of a half vector, is quickest and has all its digits; it may be infinite.
         threads : int, optional
             How many share an array of a million angles or more, from 1.
 
@@ -304,10 +316,10 @@ class Distribution(ABC):
         Raises
         ------
         MdfconvError
-            If a parameter is outside its legal range, or a pair, an azimuth or a γ does not
-            apply.
+            If a parameter is outside its legal range, a pair, an azimuth or a γ does not apply,
+            or the variable is not one of the three.
         """
-        return self._evaluate("shape", beta, parameter, phi, gamma, threads)
+        return self._evaluate("shape", beta, parameter, phi, gamma, variable, threads)
 
     @overload
     def normalized(self, beta: float, parameter: float, *, gamma: float | None = ...) -> float: ...
@@ -321,13 +333,14 @@ class Distribution(ABC):
         *,
         phi: ArrayLike | None = None,
         gamma: ArrayLike | None = None,
+        variable: Variable = "angle",
         threads: int = 1,
     ) -> Any:
         """Evaluate the normalized form D, for which ∫ D cos β dω = 1.
 
         Parameters, shapes and errors are those of `unit`; the result is in 1/sr.
         """
-        return self._evaluate("_normalized", beta, parameter, phi, gamma, threads)
+        return self._evaluate("_normalized", beta, parameter, phi, gamma, variable, threads)
 
     @overload
     def cumulative(self, beta: float, parameter: float, *, complement: bool = ...) -> float: ...
@@ -457,7 +470,7 @@ class Distribution(ABC):
         return self._legal(_elementwise(self._from_peak_alpha, _positive(alpha)))
 
     @abstractmethod
-    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
+    def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
         """Kernel of D(β)/D(0); writes to `out` and returns it."""
 
     @abstractmethod
@@ -465,7 +478,7 @@ class Distribution(ABC):
         """Kernel of D(0) of the normalized form, 1/sr."""
 
     @abstractmethod
-    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+    def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         """Kernel of D(β)/D(0) and of ∂ ln(D(β)/D(0)) / ∂ ln p, p the parameter."""
 
     @abstractmethod
@@ -473,17 +486,19 @@ class Distribution(ABC):
         """Kernel of ∂ ln D(0) / ∂ ln p of the normalized form."""
 
     @abstractmethod
-    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+    def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         """Kernel of F(β) and 1 − F(β), each with its own digits."""
 
-    def cumulative_with_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+    def cumulative_with_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         """Return F and ∂F/∂ ln p for angles, shape (n, k), and parameters p, shape (n, 1)."""
-        share = self._cumulative(beta, parameter)[0]
+        share = self._cumulative(angles, parameter)[0]
         if self.scales_with_slope:
             # F is a function of tan β / p, and dF = 2π D sin β cos β dβ.
-            lobe = self._lobe(beta, parameter) * self._at_normal(parameter)
-            return share, -0.5 * np.pi * lobe * np.square(np.sin(2 * beta))
-        above, below = (self._cumulative(beta, parameter * np.exp(s))[0] for s in (_STEP, -_STEP))
+            lobe = self._lobe(angles, parameter) * self._at_normal(parameter)
+            # sin β cos β = tan β cos²β
+            product = angles.tangent_square / np.square(1 + angles.tangent_square)
+            return share, -2 * np.pi * lobe * product
+        above, below = (self._cumulative(angles, parameter * np.exp(s))[0] for s in (_STEP, -_STEP))
         return share, (above - below) / (2 * _STEP)
 
     def _off_axis_maximum(self, parameter: Array) -> Array | None:
@@ -528,9 +543,11 @@ class Distribution(ABC):
         """Return the angle beyond which D is 0, radians; None if there is none."""
         return None
 
-    def with_slope(self, beta: Array, parameter: Array, *, normalized: bool) -> tuple[Array, Array]:
+    def with_slope(
+        self, angles: Angles, parameter: Array, *, normalized: bool
+    ) -> tuple[Array, Array]:
         """Return D and ∂D/∂ ln p for angles, shape (n, k), and parameters p, shape (n, 1)."""
-        value, slope = self._lobe_and_log_slope(beta, parameter)
+        value, slope = self._lobe_and_log_slope(angles, parameter)
         if normalized:
             value *= self._at_normal(parameter)
             slope += self._log_slope_at_normal(parameter)
@@ -542,13 +559,12 @@ class Distribution(ABC):
         slope *= value
         return value, slope
 
-    def shape(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
+    def shape(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
         """Return the unit form of unchecked arrays that broadcast, for fits.
 
-        As `unit` without its checks and its blocks, which only pay for large arrays; `beta`
-        has the shape of the result.
+        As `unit` without its checks and its blocks, which only pay for large arrays.
         """
-        value = self._lobe(beta, parameter, out)
+        value = self._lobe(angles, parameter, out)
         maximum = self._off_axis_maximum(parameter)
         return value if maximum is None else np.divide(value, maximum, out=value)
 
@@ -559,8 +575,8 @@ class Distribution(ABC):
         ratio = self._off_axis_maximum(parameter)
         return self._at_normal(parameter) * (1 if ratio is None else ratio)
 
-    def _normalized(self, beta: Array, parameter: Array, out: Array) -> None:
-        self._lobe(beta, parameter, out)
+    def _normalized(self, angles: Angles, parameter: Array, out: Array) -> None:
+        self._lobe(angles, parameter, out)
         out *= self._finite(self._at_normal(parameter))
 
     def _finite(self, peak: Array) -> Array:
@@ -569,17 +585,17 @@ class Distribution(ABC):
             raise MdfconvError(f"a lobe of {self.label} overflows {peak.dtype.name} at its peak")
         return peak
 
-    def _cumulative_lobe(self, beta: Array, parameter: Array, out: Array) -> None:
-        np.minimum(self._cumulative(beta, parameter)[0], 1, out=out)
+    def _cumulative_lobe(self, angles: Angles, parameter: Array, out: Array) -> None:
+        np.minimum(self._cumulative(angles, parameter)[0], 1, out=out)
 
-    def _cumulative_tail(self, beta: Array, parameter: Array, out: Array) -> None:
-        np.minimum(self._cumulative(beta, parameter)[1], 1, out=out)
+    def _cumulative_tail(self, angles: Angles, parameter: Array, out: Array) -> None:
+        np.minimum(self._cumulative(angles, parameter)[1], 1, out=out)
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         """Kernel of β for F = `lobe` and 1 − F = `tail`."""
 
         def excess(log_beta: Array, lobe: Array, tail: Array, parameter: Array) -> Array:
-            below, above = self._cumulative(np.exp(log_beta), parameter)
+            below, above = self._cumulative(Angles(np.exp(log_beta)), parameter)
             return np.where(lobe < tail, below - lobe, tail - above)
 
         bracket = (np.log(_SMALLEST_DRAWN), np.log(np.pi / 2))
@@ -589,16 +605,16 @@ class Distribution(ABC):
 
     def _half_tangent(self, parameter: Array) -> Array:
         def excess(log_beta: Array, parameter: Array) -> Array:
-            return self._lobe(np.exp(log_beta), parameter) - 0.5
+            return self._lobe(Angles(np.exp(log_beta)), parameter) - 0.5
 
         bracket = (np.log(_SMALLEST_ANGLE), np.log(np.pi / 2))
         return np.tan(np.exp(find_root(excess, bracket, parameter)))
 
     def _from_half_tangent(self, tangent: Array) -> Array:
-        def excess(log_parameter: Array, beta_half: Array) -> Array:
-            return self._lobe(beta_half, np.exp(log_parameter)) - 0.5
+        def excess(log_parameter: Array, tangent: Array) -> Array:
+            return self._lobe(Angles(tangent=tangent), np.exp(log_parameter)) - 0.5
 
-        return np.exp(find_root(excess, self._log_range(), np.arctan(tangent)))
+        return np.exp(find_root(excess, self._log_range(), tangent))
 
     def _peak_alpha(self, parameter: Array) -> Array:
         return 1 / np.sqrt(np.pi * self._at_normal(parameter))
@@ -624,26 +640,35 @@ class Distribution(ABC):
         parameter: Any,
         phi: ArrayLike | None = None,
         gamma: ArrayLike | None = None,
+        variable: Variable = "angle",
         threads: int = 1,
     ) -> Any:
         """Check the arguments and evaluate the kernel of a name in blocks."""
         if isinstance(parameter, tuple) or phi is not None:
-            return self._evaluate_pair(kernel, beta, parameter, phi, threads)
+            return self._evaluate_pair(kernel, beta, parameter, phi, variable, threads)
         if self.second_parameter is None:
             if gamma is not None:
                 raise MdfconvError(f"{self.name} has one parameter and no γ")
             legal = self._held(parameter, beta)
-            return evaluate(getattr(self, kernel), beta, legal, threads=threads)
+            of_block = _of_variable(getattr(self, kernel), variable)
+            return evaluate(of_block, beta, legal, threads=threads)
         gammas = self.second_parameter.check(self.gamma if gamma is None else gamma, self.name)
         legal = self._held(parameter, beta, gammas)
 
-        def with_gamma(beta: Array, parameter: Array, gamma: Array, out: Array) -> None:
-            getattr(self.with_gammas(gamma), kernel)(beta, parameter, out)
+        def with_gamma(angles: Angles, parameter: Array, gamma: Array, out: Array) -> None:
+            getattr(self.with_gammas(gamma), kernel)(angles, parameter, out)
 
-        return evaluate(with_gamma, beta, legal, gammas, threads=threads)
+        of_block = _of_variable(with_gamma, variable)
+        return evaluate(of_block, beta, legal, gammas, threads=threads)
 
     def _evaluate_pair(
-        self, kernel: str, beta: ArrayLike, pair: Any, phi: ArrayLike | None, threads: int
+        self,
+        kernel: str,
+        beta: ArrayLike,
+        pair: Any,
+        phi: ArrayLike | None,
+        variable: Variable,
+        threads: int,
     ) -> Any:
         """Evaluate the kernel of a name for a pair of parameters and azimuths."""
         if self.anisotropic and not isinstance(pair, tuple):
@@ -658,7 +683,7 @@ class Distribution(ABC):
         if phi is None:
             raise MdfconvError("a pair of parameters needs an azimuth phi")
         x, y = (self._held(value, beta, phi) for value in pair)
-        return evaluate(for_pair, beta, x, y, phi, threads=threads)
+        return evaluate(_of_variable(for_pair, variable), beta, x, y, phi, threads=threads)
 
     def _held(self, parameter: ArrayLike, *others: Any) -> Any:
         """Return legal parameters that the type in which all is computed can hold."""
@@ -676,23 +701,23 @@ class AnisotropicDistribution(Distribution):
     anisotropic = True
 
     @abstractmethod
-    def _lobe_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
+    def _lobe_pair(self, angles: Angles, x: Array, y: Array, phi: Array, out: Array) -> None:
         """Kernel of D(β, φ)/D(0); writes to `out`."""
 
     @abstractmethod
     def _at_normal_pair(self, x: Array, y: Array) -> Array:
         """Kernel of D(0) of the normalized form, 1/sr."""
 
-    def shape_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
+    def shape_pair(self, angles: Angles, x: Array, y: Array, phi: Array, out: Array) -> None:
         """Write the unit form for a pair of parameters to `out`."""
-        self._lobe_pair(beta, x, y, phi, out)
+        self._lobe_pair(angles, x, y, phi, out)
         # Over all azimuths the maximum is that along the rougher axis.
         maximum = self._off_axis_maximum(np.maximum(x, y))
         if maximum is not None:
             out /= maximum
 
-    def _normalized_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
-        self._lobe_pair(beta, x, y, phi, out)
+    def _normalized_pair(self, angles: Angles, x: Array, y: Array, phi: Array, out: Array) -> None:
+        self._lobe_pair(angles, x, y, phi, out)
         out *= self._finite(self._at_normal_pair(x, y))
 
 
@@ -715,6 +740,21 @@ class AlphaDistribution(Distribution):
         return alpha
 
 
+def _of_variable(kernel: Kernel, variable: Variable) -> Kernel:
+    """Return a kernel of `Angles` as one of blocks of a variable, 0 below the horizon."""
+    if variable not in VARIABLES:
+        raise MdfconvError(f"a variable is {', '.join(VARIABLES)}, not {variable!r}")
+
+    def of_block(values: Array, *operands: Array) -> None:
+        *parameters, out = operands
+        angles = VARIABLES[variable](values)
+        kernel(angles, *parameters, out)
+        if angles.beyond is not None:
+            out[angles.beyond] = 0
+
+    return of_block
+
+
 @lru_cache(maxsize=64)
 def _smith_table(mdf: Distribution, parameter: float) -> SmithTable:
     """Return the table of Λ for a lobe."""
@@ -723,7 +763,9 @@ def _smith_table(mdf: Distribution, parameter: float) -> SmithTable:
     end = None if edge is None else float(edge[0])
     # At the ends of a range kernels overflow on their way to a result.
     with np.errstate(all="ignore"):
-        return smith_table(lambda beta: mdf._lobe(beta, one), float(mdf._peak_alpha(one)[0]), end)
+        return smith_table(
+            lambda angles: mdf._lobe(angles, one), float(mdf._peak_alpha(one)[0]), end
+        )
 
 
 def _elementwise(function: Kernel, values: ArrayLike) -> Any:

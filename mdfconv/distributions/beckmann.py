@@ -7,7 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mdfconv.distributions import base
-from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
+from mdfconv.distributions.angles import Angles
+from mdfconv.distributions.elementary import exp_of_product, one_minus_exp_of_product
+from mdfconv.distributions.evaluation import Array, inverse_square
 from mdfconv.distributions.parameter import GLOSSINESS, ROUGHNESS, Parameter
 
 _NEWTON_STEPS = 12
@@ -64,18 +66,16 @@ class Beckmann(base.AlphaDistribution, base.AnisotropicDistribution):
         _printed_unit, cosine=_printed_cosine, from_cosine=_printed_from_cosine
     )
 
-    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
-        square = tangent_square(beta, out)
-        return _times_secant_power(square, square * -inverse_square(parameter))
+    def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
+        return _exp_times_secant_power(angles, -inverse_square(parameter), out)
 
-    def _lobe_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
-        square = tangent_square(beta, out)
-        _times_secant_power(square, square * -slope_scale(x, y, phi))
+    def _lobe_pair(self, angles: Angles, x: Array, y: Array, phi: Array, out: Array) -> None:
+        _exp_times_secant_power(angles, -slope_scale(x, y, phi), out)
 
-    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        square = tangent_square(beta)
-        exponent = square * inverse_square(parameter)
-        return _times_secant_power(square, -exponent), 2 * exponent
+    def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        scale = inverse_square(parameter)
+        value = _exp_times_secant_power(angles, -scale, None)
+        return value, angles.tangent_square * (2 * scale)
 
     def mode(self, parameter: Array) -> Array:
         """Return the angle of the maximum: tan²β = 2m² − 1 where m² > ½, else 0."""
@@ -84,9 +84,9 @@ class Beckmann(base.AlphaDistribution, base.AnisotropicDistribution):
     def _log_slope_off_axis(self, parameter: Array) -> Array:
         return 4 - 2 / np.maximum(np.square(parameter), 0.5)
 
-    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        exponent = tangent_square(beta) * inverse_square(parameter)
-        return -np.expm1(-exponent), np.exp(-exponent)
+    def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        arguments = angles.tangent_square, -inverse_square(parameter)
+        return one_minus_exp_of_product(*arguments), exp_of_product(*arguments)
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         # Walter et al. 2007, eq. (28).
@@ -132,13 +132,13 @@ def slope_scale(x: Array, y: Array, phi: Array) -> Array:
     return along_x + np.square(np.sin(phi)) * inverse_square(y)
 
 
-def _times_secant_power(square: Array, exponent: Array) -> Array:
-    """Turn t² into (1+t²)² e^exponent in place."""
-    np.exp(exponent, out=exponent)
-    square += 1
-    np.square(square, out=square)
-    square *= exponent
-    return square
+def _exp_times_secant_power(angles: Angles, scale: Array, out: Array | None) -> Array:
+    """Return (1+t²)² e^(k t²) for k = `scale`."""
+    value = exp_of_product(angles.tangent_square, scale, out)
+    power = 1 + angles.tangent_square
+    np.square(power, out=power)
+    value *= power
+    return value
 
 
 DISTRIBUTIONS = (Beckmann(),)

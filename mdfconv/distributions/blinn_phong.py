@@ -7,7 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from mdfconv.distributions import base
-from mdfconv.distributions.evaluation import Array, tangent_square
+from mdfconv.distributions.angles import Angles
+from mdfconv.distributions.elementary import exp_of_product, one_minus_exp_of_product
+from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import REFLECTED, Parameter
 
 
@@ -56,32 +58,26 @@ class BlinnPhong(base.Distribution):
         from_peak_alpha=lambda alpha: 2 / alpha**2 - 2,
     )
 
-    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
-        value = tangent_square(beta, out)
-        np.log1p(value, out=value)
-        value *= -0.5 * parameter
-        return np.exp(value, out=value)
+    def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
+        return exp_of_product(angles.log_secant_square, -0.5 * parameter, out)
 
     def _at_normal(self, parameter: Array) -> Array:
         return (parameter + 2) / (2 * np.pi)
 
-    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        exponent = np.log1p(tangent_square(beta))
-        exponent *= -0.5 * parameter
-        return np.exp(exponent), exponent
+    def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        return self._lobe(angles, parameter), angles.log_secant_square * (-0.5 * parameter)
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return parameter / (parameter + 2)
 
-    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        exponent = -0.5 * (parameter + 2) * np.log1p(tangent_square(beta))
-        return -np.expm1(exponent), np.exp(exponent)
+    def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        arguments = angles.log_secant_square, -0.5 * (parameter + 2)
+        return one_minus_exp_of_product(*arguments), exp_of_product(*arguments)
 
-    def cumulative_with_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+    def cumulative_with_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         """Return F and ∂F/∂ ln N, as in the base class."""
-        logarithm = 0.5 * np.log1p(tangent_square(beta))
-        exponent = -(parameter + 2) * logarithm
-        return -np.expm1(exponent), parameter * logarithm * np.exp(exponent)
+        share = one_minus_exp_of_product(angles.log_secant_square, -0.5 * (parameter + 2))
+        return share, (0.5 * parameter) * angles.log_secant_square * (1 - share)
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         exponent = 2 * base.negative_log_tail(lobe, tail) / (parameter + 2)
@@ -120,8 +116,8 @@ class AshikhminShirley(BlinnPhong, base.AnisotropicDistribution):
     parameters = (Parameter("exponents", "N", (1.0, 1e4), larger_is_smoother=True),)
     equivalent = base.Equivalent("blinn-phong")
 
-    def _lobe_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
-        self._lobe(beta, x * np.square(np.cos(phi)) + y * np.square(np.sin(phi)), out)
+    def _lobe_pair(self, angles: Angles, x: Array, y: Array, phi: Array, out: Array) -> None:
+        self._lobe(angles, x * np.square(np.cos(phi)) + y * np.square(np.sin(phi)), out)
 
     def _at_normal_pair(self, x: Array, y: Array) -> Array:
         return np.sqrt(x + 2) * np.sqrt(y + 2) / (2 * np.pi)

@@ -74,20 +74,19 @@ def computing_dtype(*operands: Any) -> tuple[np.dtype[Any], np.dtype[Any]]:
     return dtype, dtype
 
 
-def evaluate(kernel: Kernel, beta: ArrayLike, *operands: ArrayLike, threads: int = 1) -> Any:
-    """Evaluate a kernel over the broadcast of an angle and its parameters.
+def evaluate(kernel: Kernel, angles: ArrayLike, *operands: ArrayLike, threads: int = 1) -> Any:
+    """Evaluate a kernel over the broadcast of angles and their parameters.
 
     Parameters
     ----------
     kernel : callable
-        ``kernel(beta, *operands, out)`` maps one-dimensional blocks to a block of values,
+        ``kernel(angles, *operands, out)`` maps one-dimensional blocks to a block of values,
         which it writes to `out`. The block of angles is as long as `out`; a parameter that
         is constant over the block arrives with one element. They must not be written to.
-    beta : array_like
-        Angle between surface normal and half vector, radians, even. Beyond ±π/2 a facet
-        faces away from the surface and the value is 0.
+    angles : array_like
+        The angles, in the kernel's variable.
     *operands : array_like
-        Parameters that broadcast against `beta`.
+        Parameters that broadcast against `angles`.
     threads : int
         How many share the blocks of a large array.
 
@@ -96,7 +95,7 @@ def evaluate(kernel: Kernel, beta: ArrayLike, *operands: ArrayLike, threads: int
     numpy.ndarray or numpy scalar
         The values, in the broadcast shape.
     """
-    inputs = [as_operand(beta), *(as_operand(operand) for operand in operands)]
+    inputs = [as_operand(angles), *(as_operand(operand) for operand in operands)]
     dtype, result_dtype = computing_dtype(*inputs)
     arrays = [np.asarray(value) for value in inputs]
     try:
@@ -128,16 +127,9 @@ def _run(kernel: Kernel, iterator: Any, start: int, end: int) -> None:
     """Evaluate a kernel on a part of an iterator's range."""
     part = iterator.copy()
     part.iterrange = start, end
-    # Read as integers, floats from 0 to π/2 keep their order and all others (negative, NaN)
-    # are larger: one reduction shows that nothing needs a closer look.
-    horizon = part.dtypes[-1].type(np.pi / 2)
-    bits = np.dtype(f"u{horizon.itemsize}")
     with part, np.errstate(all="ignore"):
-        for *blocks, out in part:
-            angle, *rest = blocks
-            kernel(angle, *(b[:1] if b.strides[0] == 0 else b for b in rest), out)
-            if angle.view(bits).max() > horizon.view(bits):
-                out[np.abs(angle) > horizon] = 0
+        for angles, *rest, out in part:
+            kernel(angles, *(b[:1] if b.strides[0] == 0 else b for b in rest), out)
 
 
 def worth_threads(size: int, threads: int) -> bool:
@@ -160,14 +152,11 @@ def in_parts(run: Callable[[int, int], None], size: int, threads: int) -> None:
 
 
 def inverse_square(values: Array) -> Array:
-    """Return 1/values², finite even where values² underflows, so that 0 times it is 0."""
-    return np.minimum(1 / (values * values), np.finfo(values.dtype).max)
+    """Return 1/values², finite even where values² underflows, so that 0 times it is 0.
 
-
-def tangent_square(beta: Array, out: Array | None = None) -> Array:
-    """Return tan²β, the variable in which the kernels keep their digits up to π/2."""
-    tangent: Array = np.tan(beta, out=out)
-    return np.square(tangent, out=tangent)
+    So it stays when it is multiplied by a small number.
+    """
+    return np.minimum(1 / (values * values), np.finfo(values.dtype).max / 8)
 
 
 @cache

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.base import Distribution, MapVariables, Printed
+from mdfconv.distributions.elementary import exp_of_product
 from mdfconv.distributions.evaluation import Array, gauss_legendre, inverse_square
 from mdfconv.distributions.parameter import Parameter
 
@@ -62,35 +64,30 @@ class Gauss(Distribution):
         peak_alpha=lambda m: 1 / np.sqrt(np.pi * _printed_constant(m)),
     )
 
-    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
-        value = np.square(beta, out=out)
-        value *= -inverse_square(parameter)
-        return np.exp(value, out=value)
+    def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
+        return exp_of_product(np.square(angles.beta), -inverse_square(parameter), out)
 
     def _at_normal(self, parameter: Array) -> Array:
         return 1 / (np.pi * _sine_integral(parameter))
 
-    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        exponent = np.square(beta)
-        exponent *= -inverse_square(parameter)
-        value = np.exp(exponent)
-        exponent *= -2
-        return value, exponent
+    def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        square, scale = np.square(angles.beta), inverse_square(parameter)
+        return exp_of_product(square, -scale), square * (2 * scale)
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         # −∂ ln Z/∂ ln m as a mean: differences of Faddeeva functions cancel for large m.
         return -2 * _mean_square(parameter) / np.square(parameter)
 
-    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+    def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         # The whole integral is the longer of the two parts plus the other.
-        angle, m = np.broadcast_arrays(beta, parameter)
+        angle, m = np.broadcast_arrays(angles.beta, parameter)
         to_horizon = (0.5 * np.pi - angle) + _HALF_PI_REST
         below = _slab_integral(np.zeros_like(angle), angle, 0.5 * np.pi + 0 * angle, m)
         above = _slab_integral(angle, to_horizon, to_horizon, m)
         whole = below + above
         return below / whole, above / whole
 
-    def cumulative_with_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+    def cumulative_with_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         """Return F and ∂F/∂ ln m, as in the base class, to 1e-15 of the whole.
 
         The completed square is quick, and a fit asks for no digits of the tail.
@@ -107,13 +104,14 @@ class Gauss(Distribution):
             slope = 2 * np.square(angle / parameter) * w + turned
             return (factor * w).imag, (factor * slope).imag
 
-        horizon = np.full_like(parameter, 0.5 * np.pi)
+        beta, horizon = angles.beta, np.full_like(parameter, 0.5 * np.pi)
         start, middle, end = (primitive(b) for b in (0 * horizon, beta, horizon))
         whole, whole_slope = start[0] - end[0], start[1] - end[1]
         share = (start[0] - middle[0]) / whole
         slope = (start[1] - middle[1] - share * whole_slope) / whole
         wide = parameter[..., 0] > _WIDE
         if wide.any():
+            beta = np.broadcast_to(beta, slope.shape)
             slope[wide] = self._wide_slope(beta[wide], parameter[wide])
         return share, slope
 

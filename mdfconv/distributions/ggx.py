@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mdfconv.distributions import base
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.beckmann import slope_scale
-from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
+from mdfconv.distributions.evaluation import Array, inverse_square
 from mdfconv.distributions.parameter import GLOSSINESS, ROUGHNESS, Parameter
 
 _EXCESS = np.sqrt(2) - 1
@@ -62,24 +63,22 @@ class GGX(base.AlphaDistribution, base.AnisotropicDistribution):
         from_cosine=lambda c: printed_from_cosine(c, np.full_like(c, 2)),
     )
 
-    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
-        return trowbridge_reitz(beta, inverse_square(parameter), out)
+    def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
+        return trowbridge_reitz(angles, inverse_square(parameter), out)
 
-    def _lobe_pair(self, beta: Array, x: Array, y: Array, phi: Array, out: Array) -> None:
-        trowbridge_reitz(beta, slope_scale(x, y, phi), out)
+    def _lobe_pair(self, angles: Angles, x: Array, y: Array, phi: Array, out: Array) -> None:
+        trowbridge_reitz(angles, slope_scale(x, y, phi), out)
 
-    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        square = tangent_square(beta)
-        ratio = square * inverse_square(parameter)
-        square += 1
+    def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        ratio = angles.tangent_square * inverse_square(parameter)
         fall = 1 + ratio
-        square /= fall
         ratio /= fall
         ratio *= 4
-        return np.square(square, out=square), ratio
+        np.divide(1 + angles.tangent_square, fall, out=fall)
+        return np.square(fall, out=fall), ratio
 
-    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        return trowbridge_reitz_shares(beta, inverse_square(parameter))
+    def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        return trowbridge_reitz_shares(angles, inverse_square(parameter))
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         # Walter et al. 2007, eq. (35).
@@ -106,13 +105,12 @@ def trowbridge_reitz_lambda(slope: Array) -> Array:
     return np.where(np.isinf(slope), np.inf, value)
 
 
-def trowbridge_reitz(beta: Array, scale: Array, out: Array | None) -> Array:
+def trowbridge_reitz(angles: Angles, scale: Array, out: Array | None) -> Array:
     """Return [(1+t²) / (1+k t²)]² for k = `scale` = 1/α².
 
     As [1/k + (1−1/k) / (1+k t²)]² it takes one pass over memory less.
     """
-    value = tangent_square(beta, out)
-    value *= scale
+    value = np.multiply(angles.tangent_square, scale, out=out)
     value += 1
     floor = 1 / scale
     np.divide(1 - floor, value, out=value)
@@ -120,9 +118,9 @@ def trowbridge_reitz(beta: Array, scale: Array, out: Array | None) -> Array:
     return np.square(value, out=value)
 
 
-def trowbridge_reitz_shares(beta: Array, scale: Array) -> tuple[Array, Array]:
+def trowbridge_reitz_shares(angles: Angles, scale: Array) -> tuple[Array, Array]:
     """Return F = k t² / (1+k t²) and 1 − F for k = `scale` = 1/α²."""
-    ratio = tangent_square(beta) * scale
+    ratio = angles.tangent_square * scale
     # Finite, so that the share of the lobe is 1 where it overflows.
     ratio = np.minimum(ratio, np.finfo(ratio.dtype).max)
     return ratio / (1 + ratio), 1 / (1 + ratio)

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from mdfconv.distributions import ggx
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.base import Distribution, Equivalent, Printed, gamma_parameter
-from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
+from mdfconv.distributions.elementary import exp_of_product, log1p
+from mdfconv.distributions.evaluation import Array, inverse_square
 from mdfconv.distributions.parameter import Parameter
 
 
@@ -58,17 +60,13 @@ class GTR(Distribution):
         """GGX at γ = 2."""
         return ggx.ggx_at_two(self)
 
-    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
+    def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
         scale = inverse_square(parameter)
         if np.size(self.gamma) == 1 and self.gamma == 2:
-            return ggx.trowbridge_reitz(beta, scale, out)
+            return ggx.trowbridge_reitz(angles, scale, out)
         # exp(−γ ln(1 + x)), x = sin²β (1−α²)/α²
-        value = tangent_square(beta, out)
-        value /= 1 + value
-        value *= scale * ((1 - parameter) * (1 + parameter))
-        np.log1p(value, out=value)
-        value *= -self.gamma
-        return np.exp(value, out=value)
+        x = angles.sine_square * (scale * ((1 - parameter) * (1 + parameter)))
+        return exp_of_product(log1p(x), -self.gamma, out)
 
     def _at_normal(self, parameter: Array) -> Array:
         # k α^(−2γ) = (1−α²)/(L α²π) · 1/φ(y L) with L = −ln α², y = γ−1: each factor tends to 1
@@ -77,10 +75,11 @@ class GTR(Distribution):
         first = _ratio((1 - parameter) * (1 + parameter), log_square)
         return first / _phi((self.gamma - 1) * log_square) / (np.pi * parameter * parameter)
 
-    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        ratio = np.square(np.sin(beta)) * inverse_square(parameter)
+    def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        ratio = angles.sine_square * inverse_square(parameter)
         x = ratio * ((1 - parameter) * (1 + parameter))
-        return np.exp(-self.gamma * np.log1p(x)), 2 * self.gamma * ratio / (1 + x)
+        value = exp_of_product(log1p(x), -self.gamma)
+        return value, 2 * self.gamma * ratio / (1 + x)
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         log_square = -2 * np.log(parameter)
@@ -90,10 +89,10 @@ class GTR(Distribution):
         y = (self.gamma - 1) * log_square
         return first - 2 * (self.gamma - 1) * _bernoulli(y) - 2
 
-    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+    def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         # With z = ln(1+x), Z = ln(1+X), y = γ−1 and φ(u) = (1 − e^(−u))/u:
         # F = z φ(yz) / (Z φ(yZ)), 1 − F = e^(−yz) (Z−z) φ(y (Z−z)) / (Z φ(yZ)).
-        square = tangent_square(beta)
+        square = angles.tangent_square
         cosine_square = 1 / (1 + square)
         largest = ((1 - parameter) * (1 + parameter)) * inverse_square(parameter)
         x = square * cosine_square * largest

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mdfconv.distributions import base
-from mdfconv.distributions.evaluation import Array, tangent_square
+from mdfconv.distributions.angles import Angles
+from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import Parameter
 
 _NEWTON_STEPS = 12
@@ -42,13 +43,9 @@ class Sawicki(base.Distribution):
         from_peak_alpha=lambda alpha: 8 / (3 * alpha**2) - 3,
     )
 
-    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
-        value = tangent_square(beta, out)
-        sum_ = 1 + value
-        secant = np.sqrt(sum_)
-        sum_ += secant
-        value /= sum_
-        value *= 0.25 * (parameter - 1)
+    def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
+        drop, secant = _drop_and_secant(angles)
+        value = np.multiply(drop, 0.25 * (parameter - 1), out=out)
         value += 1
         np.square(value, out=value)
         np.square(value, out=value)
@@ -58,38 +55,32 @@ class Sawicki(base.Distribution):
     def _at_normal(self, parameter: Array) -> Array:
         return 3 * (3 + parameter) / (8 * np.pi)
 
-    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        drop = tangent_square(beta)
-        sum_ = 1 + drop
-        secant = np.sqrt(sum_)
-        sum_ += secant
-        drop /= sum_
-        fall = np.multiply(drop, 0.25 * (parameter - 1), out=sum_)
+    def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        drop, secant = _drop_and_secant(angles)
+        fall = drop * (0.25 * (parameter - 1))
         fall += 1
-        drop *= -parameter
-        drop /= fall
+        slope = drop * -parameter
+        slope /= fall
         np.square(fall, out=fall)
         np.square(fall, out=fall)
         fall *= secant
-        return np.divide(1, fall, out=fall), drop
+        return np.divide(1, fall, out=fall), slope
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return parameter / (parameter + 3)
 
-    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        square = tangent_square(beta)
-        secant = np.sqrt(1 + square)
-        drop = square / (secant * (1 + secant))
+    def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        drop, secant = _drop_and_secant(angles)
         k = 0.25 * (parameter - 1)
         # With q = 1 − c/(1+kv) both are sums of positive terms.
         ratio = 1 / (secant * (1 + k * drop))
         q = (1 + k) * drop / (1 + k * drop)
         return q * (3 * ratio + q * q), ratio**3
 
-    def cumulative_with_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+    def cumulative_with_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         """Return F and ∂F/∂ ln N_DS, as in the base class."""
-        share, tail = self._cumulative(beta, parameter)
-        drop = 2 * np.square(np.sin(0.5 * beta))
+        share, tail = self._cumulative(angles, parameter)
+        drop, _ = _drop_and_secant(angles)
         return share, 0.75 * parameter * tail * drop / (1 + 0.25 * (parameter - 1) * drop)
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
@@ -122,6 +113,14 @@ class Sawicki(base.Distribution):
 
     def _from_peak_alpha(self, alpha: Array) -> Array:
         return 8 / (3 * np.square(alpha)) - 3
+
+
+def _drop_and_secant(angles: Angles) -> tuple[Array, Array]:
+    """Return 1 − cos β and 1/cos β, both from tan²β: one needs its digits at 0, one at π/2."""
+    square = 1 + angles.tangent_square
+    secant = np.sqrt(square)
+    square += secant
+    return np.divide(angles.tangent_square, square, out=square), secant
 
 
 DISTRIBUTIONS = (Sawicki(),)

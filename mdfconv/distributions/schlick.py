@@ -8,7 +8,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from mdfconv.distributions import base
-from mdfconv.distributions.evaluation import Array, tangent_square
+from mdfconv.distributions.angles import Angles
+from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import Parameter
 
 # Where y = x/m is smaller than this, 1 − w is a difference of numbers that agree in too many digits
@@ -53,23 +54,19 @@ class Schlick(base.AlphaDistribution):
     map_variables = base.BOUNDED_ALPHA_MAP
     printed = base.Printed.of_alpha(_printed_unit)
 
-    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
+    def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
         # Angles often come sorted or in tiles: of whole blocks beyond the edge nothing is computed.
+        beta = angles.beta
         if out is not None and beta.min() > _JUST_BEYOND * np.max(self.edge(parameter)):
             out.fill(0)
             return out
-        # tan²(β/2)/(1+tan²(β/2)) = ½ (1 − cos β)
-        w = np.multiply(beta, 0.5)
-        tangent_square(w, w)
-        fall = w + 1
-        w /= fall
-        w *= 2 / parameter
+        w = angles.versine * (1 / parameter)
         y = np.subtract(1, w, out=out)
         if _sharpen_edge(y, beta, parameter):
             # Against arrays, not against numbers: NumPy has a fast loop for that.
             np.maximum(y, np.zeros_like(y), out=y)
             np.minimum(w, np.ones_like(w), out=w)
-        fall = np.subtract(2, w, out=fall)
+        fall = 2 - w
         fall *= w
         fall *= (1 - parameter) / parameter
         fall += 1
@@ -81,30 +78,29 @@ class Schlick(base.AlphaDistribution):
         y /= fall
         return y
 
-    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        value = self._lobe(beta, parameter)
-        w = np.minimum(2 * np.square(np.sin(0.5 * beta)) / parameter, 1)
+    def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        value = self._lobe(angles, parameter)
+        w = np.minimum(angles.versine / parameter, 1)
         y = 1 - w
-        _sharpen_edge(y, beta, parameter)
+        _sharpen_edge(y, angles.beta, parameter)
         bend = (1 - parameter) / parameter
         fall = 1 + bend * w * (2 - w)
         # At and beyond the edge D is 0, and so is its slope.
         y = np.where(y > 0, y, 1)
         return value, w / y + 2 * w * ((2 - w) / parameter + 2 * bend * y) / fall
 
-    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        angle, m = np.broadcast_arrays(beta, parameter)
-        w = np.minimum(2 * np.square(np.sin(0.5 * angle)) / m, 1)
+    def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        w = np.minimum(angles.versine / parameter, 1)
         y = 1 - w
-        _sharpen_edge(y, angle, m)
+        _sharpen_edge(y, angles.beta, parameter)
         np.maximum(y, 0, out=y)
         q = w * (2 - w)
-        below = m + (1 - m) * q
-        return q / below, m * np.square(y) / below
+        below = parameter + (1 - parameter) * q
+        return q / below, parameter * np.square(y) / below
 
-    def cumulative_with_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+    def cumulative_with_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         """Return F and ∂F/∂ ln m, as in the base class."""
-        w = np.minimum(2 * np.square(np.sin(0.5 * beta)) / parameter, 1)
+        w = np.minimum(angles.versine / parameter, 1)
         y, q = 1 - w, w * (2 - w)
         below = parameter + (1 - parameter) * q
         return q / below, -parameter * y * (2 * w + q * y) / np.square(below)
@@ -144,6 +140,7 @@ def _sharpen_edge(y: Array, beta: Array, parameter: Array) -> bool:
     if y.min() >= threshold:
         return False
     near = np.abs(y) < threshold
+    beta = np.broadcast_to(beta, y.shape)
     # Rounded to float32, π/2 exceeds π/2.
     angle = np.minimum(np.abs(beta[near]).astype(float), np.pi / 2)
     single = parameter.size == 1

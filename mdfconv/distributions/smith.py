@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.evaluation import Array, Kernel, gauss_legendre
 
 # The length of a panel in u, and the nodes on it.
@@ -81,7 +82,7 @@ def smith_table(lobe: Kernel, width: float, edge: float | None) -> SmithTable:
     Parameters
     ----------
     lobe : callable
-        D(β)/D(0) for an array of angles.
+        D(β)/D(0) for `Angles`.
     width : float
         The α for which D(0) of the normalized form is 1/(π α²).
     edge : float or None
@@ -97,7 +98,7 @@ def smith_table(lobe: Kernel, width: float, edge: float | None) -> SmithTable:
     tangent = np.exp(u)
     square = np.square(tangent)
     # dF/du = 2π D sin β cos β dβ/du
-    density = 2 * lobe(np.arctan(tangent).ravel()).reshape(u.shape)
+    density = 2 * lobe(Angles(tangent=tangent.ravel())).reshape(u.shape)
     density *= np.exp(2 * (u - scale)) / np.square(1 + square)
     mass = density * weight
     # Below the last panel dF/du is 2 t²/α².

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mdfconv.distributions import ggx
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.base import Distribution, Equivalent, MapVariables, Printed
 from mdfconv.distributions.evaluation import Array, inverse_square
 from mdfconv.distributions.parameter import Parameter
@@ -70,21 +71,21 @@ class Smoothie(Distribution):
         from_peak_alpha=_printed_from_ggx,
     )
 
-    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
-        return ggx.trowbridge_reitz(beta, 1 + 4 * inverse_square(parameter), out)
+    def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
+        return ggx.trowbridge_reitz(angles, 1 + 4 * inverse_square(parameter), out)
 
     def _at_normal(self, parameter: Array) -> Array:
         return (1 + 4 * inverse_square(parameter)) / np.pi
 
-    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        ratio = np.square(np.sin(beta)) * (4 * inverse_square(parameter))
+    def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        ratio = angles.sine_square * (4 * inverse_square(parameter))
         return 1 / np.square(1 + ratio), 4 * ratio / (1 + ratio)
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return -8 / (4 + np.square(parameter))
 
-    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        return ggx.trowbridge_reitz_shares(beta, 1 + 4 * inverse_square(parameter))
+    def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        return ggx.trowbridge_reitz_shares(angles, 1 + 4 * inverse_square(parameter))
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         return np.arctan(to_ggx(parameter) * np.sqrt(lobe / tail))

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from mdfconv.distributions import base
-from mdfconv.distributions.evaluation import Array, inverse_square, tangent_square
+from mdfconv.distributions.angles import Angles
+from mdfconv.distributions.elementary import exp_of_product, log1p, one_minus_exp_of_product
+from mdfconv.distributions.evaluation import Array, inverse_square
 from mdfconv.distributions.ggx import ggx_at_two, trowbridge_reitz_lambda
 from mdfconv.distributions.parameter import Parameter
 
@@ -62,33 +64,31 @@ class StudentT(base.AlphaDistribution):
         """GGX at γ = 2."""
         return ggx_at_two(self)
 
-    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
+    def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
         # [(1+t²)/(1+x) · (1+x)^(1−½γ)]²: an exponential multiplies the rounding of its exponent, so
         # that what cancels does so before it; the whole power would underflow at grazing.
-        value = tangent_square(beta, out)
-        x = value * (inverse_square(parameter) / (self.gamma - 1))
-        value += 1
+        x = self._x(angles, parameter)
+        value = np.divide(1 + angles.tangent_square, 1 + x, out=out)
         if np.size(self.gamma) > 1 or self.gamma != 2:
-            # Finite, so that 0 times its logarithm is 0.
-            power = np.minimum(x, np.finfo(x.dtype).max)
-            np.log1p(power, out=power)
-            power *= 1 - 0.5 * self.gamma
-            np.exp(power, out=power)
-            value *= power
-        x += 1
-        value /= x
+            power = log1p(x)
+            value *= exp_of_product(power, 1 - 0.5 * self.gamma, power)
         return np.square(value, out=value)
 
-    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        square = tangent_square(beta)
-        x = square * (inverse_square(parameter) / (self.gamma - 1))
-        value = np.square((1 + square) * np.exp(-0.5 * self.gamma * np.log1p(x)))
+    def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        x = self._x(angles, parameter)
+        power = exp_of_product(log1p(x), -0.5 * self.gamma)
+        value = np.square((1 + angles.tangent_square) * power)
         return value, 2 * self.gamma * x / (1 + x)
 
-    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        x = tangent_square(beta) * (inverse_square(parameter) / (self.gamma - 1))
-        exponent = (1 - self.gamma) * np.log1p(x)
-        return -np.expm1(exponent), np.exp(exponent)
+    def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        x = self._x(angles, parameter)
+        arguments = log1p(x), 1 - self.gamma
+        return one_minus_exp_of_product(*arguments), exp_of_product(*arguments)
+
+    def _x(self, angles: Angles, parameter: Array) -> Array:
+        """Return t²/((γ−1) α²), finite, so that 0 times its logarithm is 0."""
+        x = angles.tangent_square * (inverse_square(parameter) / (self.gamma - 1))
+        return np.minimum(x, np.finfo(x.dtype).max, out=x)
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         x = np.expm1(base.negative_log_tail(lobe, tail) / (self.gamma - 1))

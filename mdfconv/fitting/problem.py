@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdfconv.distributions import Distribution
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.evaluation import Array, Indices, Mask
 from mdfconv.fitting.metrics import Metric
 from mdfconv.fitting.quadrature import Breaks, Quadrature, SmoothQuadrature
@@ -25,19 +26,19 @@ def level_crossing(
 
     All have the shape (n, 1); at the angle `high` D̄ is above the level, at `low` below it.
     """
-    crosses = (level < 1) & (mdf.shape(low, parameter) < level)
+    crosses = (level < 1) & (mdf.shape(Angles(low), parameter) < level)
     high, low = np.maximum(high, _LEAST), np.maximum(low, _LEAST)
     for _ in range(_BISECTIONS):
         middle = np.sqrt(low * high)
-        above = mdf.shape(middle, parameter) >= level
+        above = mdf.shape(Angles(middle), parameter) >= level
         high, low = np.where(above, middle, high), np.where(above, low, middle)
-    at_high, at_low = (mdf.shape(angle, parameter) - level for angle in (high, low))
+    at_high, at_low = (mdf.shape(Angles(angle), parameter) - level for angle in (high, low))
     for _ in range(_SECANTS):
         with np.errstate(divide="ignore", invalid="ignore"):
             middle = high + (low - high) * at_high / (at_high - at_low)
         # Where D̄ is the level all along, any angle is.
         middle = np.where(np.isfinite(middle), middle, high)
-        value = mdf.shape(middle, parameter) - level
+        value = mdf.shape(Angles(middle), parameter) - level
         above = value >= 0
         # The end that stays pulls half as hard, so that both come near (Dowell & Jarratt 1971).
         at_high = np.where(above, value, 0.5 * at_high)
@@ -98,7 +99,7 @@ class FitProblem:
         self._quadrature, self._rows = quadrature, rows
         self._source_breaks = self._breaks(source, self._source_parameter, self._peak)
         # Unless the panels move with the target, all distances share their samples.
-        self._samples: tuple[Array, Array, Array] | None = None
+        self._samples: tuple[Angles, Array, Array] | None = None
         if not self.metric.kinks and self.target.edge(np.ones(1)) is None:
             self._samples = self._sampled(self._all, self._source_breaks)
 
@@ -113,13 +114,11 @@ class FitProblem:
 
     def coarse_distance(self, candidates: Array) -> Array:
         """Return the approximate distance for each candidate p, shape (m, c)."""
-        beta, weight = self._quadrature.coarse(self._rows, fine=bool(self.metric.kinks))
-        weight = weight * self.metric.weight(beta)
-        signal = self.metric.signal(self._source, beta, self._source_parameter, self._peak)
-        shape = (*candidates.shape, beta.shape[1])
-        angles = np.broadcast_to(beta[:, None, :], shape)
+        angles, weight = self._quadrature.coarse(self._rows, fine=bool(self.metric.kinks))
+        weight = weight * self.metric.weight(angles)
+        signal = self.metric.signal(self._source, angles, self._source_parameter, self._peak)
         rest = candidates[:, :, None], self._peak[:, :, None]
-        residual = self.metric.signal(self.target, angles, *rest)
+        residual = self.metric.signal(self.target, angles[:, None, :], *rest)
         residual -= signal[:, None, :]
         return np.einsum("ik,ijk,ijk->ij", weight, residual, residual)
 
@@ -144,11 +143,11 @@ class FitProblem:
 
         The samples are those for the target with `parameter`, shape (m,).
         """
-        beta, weight, signal = self._samples_for(parameter[:, None], self._all)
+        angles, weight, signal = self._samples_for(parameter[:, None], self._all)
         root = np.sqrt(weight)
 
         def residual(target: Distribution, parameter: Array) -> Array:
-            value = self.metric.signal(target, beta, parameter[:, None], self._peak)
+            value = self.metric.signal(target, angles, parameter[:, None], self._peak)
             return root * (value - signal)
 
         return residual
@@ -158,8 +157,8 @@ class FitProblem:
 
         Infinite where the source has no signal, as a uniform lobe has no contrast.
         """
-        beta, weight, signal = self._samples_for(parameter[:, None], self._all)
-        difference = self.metric.signal(self.target, beta, parameter[:, None], self._peak)
+        angles, weight, signal = self._samples_for(parameter[:, None], self._all)
+        difference = self.metric.signal(self.target, angles, parameter[:, None], self._peak)
         difference -= signal
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.sqrt(
@@ -172,27 +171,28 @@ class FitProblem:
     def _with_slope(self, log_parameter: Array, index: Indices) -> tuple[Array, Array, Array]:
         """Return the weights, ΔS and ∂S/∂ ln p of some problems at their samples."""
         parameter = np.exp(log_parameter)[:, None]
-        beta, weight, signal = self._samples_for(parameter, index)
-        value, slope = self.metric.signal_and_slope(self.target, beta, parameter, self._peak[index])
+        angles, weight, signal = self._samples_for(parameter, index)
+        arguments = self.target, angles, parameter, self._peak[index]
+        value, slope = self.metric.signal_and_slope(*arguments)
         value -= signal
         return weight, value, slope
 
-    def _samples_for(self, parameter: Array, index: Indices) -> tuple[Array, Array, Array]:
+    def _samples_for(self, parameter: Array, index: Indices) -> tuple[Angles, Array, Array]:
         """Return angles, weights and the source's signal for parameters of the target."""
         if self._samples is not None:
             if index.size == self.size:
                 return self._samples
-            beta, weight, signal = (array[index] for array in self._samples)
-            return beta, weight, signal
+            angles, weight, signal = self._samples
+            return angles[index], weight[index], signal[index]
         breaks = self._breaks(self.target, parameter, self._peak[index])
         return self._sampled(index, self._source_breaks.rows(index).joined(breaks))
 
-    def _sampled(self, index: Indices, breaks: Breaks) -> tuple[Array, Array, Array]:
+    def _sampled(self, index: Indices, breaks: Breaks) -> tuple[Angles, Array, Array]:
         """Return angles, weights and the source's signal."""
-        beta, weight = self._quadrature.nodes(self._rows[index], breaks)
+        angles, weight = self._quadrature.nodes(self._rows[index], breaks)
         parameter = self._source_parameter[index]
-        signal = self.metric.signal(self._source, beta, parameter, self._peak[index])
-        return beta, weight * self.metric.weight(beta), signal
+        signal = self.metric.signal(self._source, angles, parameter, self._peak[index])
+        return angles, weight * self.metric.weight(angles), signal
 
     def _breaks(self, distribution: Distribution, parameter: Array, peak: Array) -> Breaks:
         """Return where the signal of a lobe has kinks, and where it becomes 0."""

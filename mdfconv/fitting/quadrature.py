@@ -6,6 +6,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.evaluation import Array, Indices, gauss_legendre, gauss_panels
 
 # Panels from a thousandth of the half width to the horizon, the widest factor between two of
@@ -34,7 +35,7 @@ _TO_EDGE, _TO_SMOOTH_EDGE = _towards_edge(4, 10), _towards_edge(16, 5)
 
 
 # Angles and weights, shape (n, k).
-Samples: TypeAlias = tuple[Array, Array]
+Samples: TypeAlias = tuple[Angles, Array]
 
 
 class Breaks(NamedTuple):
@@ -92,11 +93,13 @@ class LobeQuadrature:
             parts.append(breaks.kinks)
         if breaks.edges is not None:
             parts.append(_products(breaks.edges, _TO_EDGE))
-        return _panels_to_edges(_sorted_panels(*parts), breaks.edges, self._root)
+        beta, weight = _panels_to_edges(_sorted_panels(*parts), breaks.edges, self._root)
+        return Angles(beta), weight
 
     def coarse(self, rows: Indices, *, fine: bool = False) -> Samples:
         """Return the panels at a low order."""
-        return gauss_panels(self._panels[rows], _ORDER if fine else _SCAN_ORDER)
+        beta, weight = gauss_panels(self._panels[rows], _ORDER if fine else _SCAN_ORDER)
+        return Angles(beta), weight
 
 
 class SmoothQuadrature:
@@ -134,7 +137,7 @@ class SmoothQuadrature:
             weight = np.broadcast_to(s[0, 1] - s[0, 0], s.shape)
         tangent = np.exp(middle + _SPREAD * np.sinh(s))
         slope = _SPREAD * np.cosh(s) * tangent / (1 + np.square(tangent))
-        return np.arctan(tangent), weight * slope
+        return Angles(tangent=tangent), weight * slope
 
     def coarse(self, rows: Indices, *, fine: bool = False) -> Samples:
         """Return all: there are few."""
@@ -151,7 +154,7 @@ def _sorted_panels(*ends: Array) -> Array:
     return np.sort(np.concatenate(ends, axis=1), axis=1)
 
 
-def _panels_to_edges(ends: Array, edges: Array | None, root: float) -> Samples:
+def _panels_to_edges(ends: Array, edges: Array | None, root: float) -> tuple[Array, Array]:
     """Return nodes and weights on panels, of which some end at an edge.
 
     There the node at the distance v^root, of a panel's width, takes the place of that at v: what
@@ -184,7 +187,7 @@ class UniformSamples:
     def nodes(self, rows: Indices, breaks: Breaks = NO_BREAKS) -> Samples:
         """Return the samples; they are what they are, wherever the kinks."""
         beta = self._beta if rows.size == len(self._beta) else self._beta[rows]
-        return beta, np.broadcast_to(1.0, beta.shape)
+        return Angles(beta), np.broadcast_to(1.0, beta.shape)
 
     def coarse(self, rows: Indices, *, fine: bool = False) -> Samples:
         """Return some of the samples, weighted so that their sum is that of all.
@@ -197,4 +200,4 @@ class UniformSamples:
         beta = self._beta[rows, ::step]
         weight = np.full_like(beta, step)
         weight[:, [0, -1]] = 0.5 * (step + 1)
-        return beta, weight
+        return Angles(beta), weight

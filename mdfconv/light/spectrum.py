@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mdfconv.distributions import Distribution
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.evaluation import Array, gauss_panels
 from mdfconv.errors import MdfconvError
 from mdfconv.light.radiance import SIGNATURE, read_radiance
@@ -259,13 +260,14 @@ class LobeSpectrum:
 
     def __call__(self, distribution: Distribution, parameter: Array) -> Array:
         """Return k_l for parameters of shape (..., 1), shape (..., k)."""
-        values = [distribution.normalized(beta, parameter) for beta in self._angles]
+        values = [distribution.normalized(angles.beta, parameter) for angles in self._angles]
         return self._transformed(*values)
 
     def with_slope(self, distribution: Distribution, parameter: Array) -> tuple[Array, Array]:
         """Return k_l and ∂k_l/∂ ln p for parameters of shape (n, 1), shapes (n, k)."""
-        angles = [np.broadcast_to(beta, (len(parameter), beta.size)) for beta in self._angles]
-        pairs = [distribution.with_slope(beta, parameter, normalized=True) for beta in angles]
+        pairs = [
+            distribution.with_slope(angles, parameter, normalized=True) for angles in self._angles
+        ]
         values, slopes = zip(*pairs, strict=True)
         return self._transformed(*values), self._transformed(*slopes)
 
@@ -278,9 +280,9 @@ class LobeSpectrum:
         return self.degree.size - self._highest
 
     @cached_property
-    def _angles(self) -> tuple[Array, Array]:
+    def _angles(self) -> tuple[Angles, Angles]:
         """The angles at which lobes are sampled, for low and for high degrees."""
-        return self._panels[0], self._radii[self._radii < np.pi / 2]
+        return Angles(self._panels[0]), Angles(self._radii[self._radii < np.pi / 2])
 
     @cached_property
     def _panels(self) -> tuple[Array, Array]:
@@ -318,7 +320,7 @@ class LobeSpectrum:
         """The transform as a matrix, from D at the angles to k_l."""
         from scipy.fft import fht
 
-        beta = self._angles[1]
+        beta = self._angles[1].beta
         samples = np.zeros((beta.size, self._radii.size))
         np.fill_diagonal(samples, np.pi * np.sqrt(2 * beta * np.sin(2 * beta)))
         spectra = fht(samples, _STEP, 0, self._offset)[:, -self._smooth_count :]

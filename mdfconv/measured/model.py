@@ -18,6 +18,7 @@ import numpy as np
 from mdfconv.brdf.fresnel import dielectric, normal_reflectance
 from mdfconv.brdf.microfacet import dot, half_vector, polar_angle, unit, v_cavity
 from mdfconv.distributions import Distribution, distribution, one_parameter_distributions
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
@@ -359,15 +360,16 @@ class SliceLobe(Lobe):
 
     def __init__(self, samples: Samples, *rest: Any) -> None:
         super().__init__(samples, *rest)
+        self._angles = Angles(samples.beta[None, :])
         self._foreshortening = foreshortening(samples.beta, samples.quantity)
         self.places = np.unique(samples.beta).size
         self.where = f" at {self.places} angles"
 
     def scanned(self, mdf: Distribution, parameters: Array) -> Terms:
         """Return terms of many parameters."""
-        beta = np.broadcast_to(self.samples.beta, (len(parameters), self.samples.beta.size))
         with np.errstate(all="ignore"):
-            return self._with_offset(mdf.shape(beta, parameters[:, None]) / self._foreshortening)
+            lobes = mdf.shape(self._angles, parameters[:, None])
+        return self._with_offset(lobes / self._foreshortening)
 
     def transform(self) -> Transform | None:
         """Return the logarithm, if the loss is that."""
@@ -391,7 +393,7 @@ class SliceLobe(Lobe):
     def _shape(self, mdf: Distribution, parameter: float) -> Array:
         value = np.array([[parameter]])
         with np.errstate(all="ignore"):
-            shape = mdf.shape(self.samples.beta[None, :], value)[0] / self._foreshortening
+            shape = mdf.shape(self._angles, value)[0] / self._foreshortening
         if self.what.is_double:
             shape *= float(mdf.maximum(value, normalized=True)[0, 0])
         return np.asarray(shape)
@@ -447,9 +449,8 @@ class DirectionalLobe(Lobe):
     def scanned(self, mdf: Distribution, parameters: Array) -> Terms:
         """Return terms of many parameters."""
         at = self._at
-        beta = np.broadcast_to(at.beta, (len(parameters), at.beta.size))
         with np.errstate(all="ignore"):
-            lobe = mdf.shape(beta, parameters[:, None])
+            lobe = mdf.shape(at.angles, parameters[:, None])
             lobe *= mdf.maximum(parameters[:, None], normalized=True)
         factor = dielectric(at.difference_cosine, _TYPICAL_INDEX) / _F0_TYPICAL
         lobe *= at.v_cavity * factor / at.denominator
@@ -489,7 +490,7 @@ class DirectionalLobe(Lobe):
         at = self._at
         value = np.array([[parameter]])
         with np.errstate(all="ignore"):
-            lobe = mdf.shape(at.beta[None, :], value)[0]
+            lobe = mdf.shape(at.angles, value)[0]
             lobe *= mdf.maximum(value, normalized=True)[0]
         lobe /= at.denominator
         if self.options.masking == "v-cavity":
@@ -547,7 +548,7 @@ class _Geometry:
 
     def __init__(self, incident: Array, outgoing: Array) -> None:
         half = half_vector(incident, outgoing)
-        self.beta = polar_angle(half)
+        self.angles = Angles(polar_angle(half)[None, :])
         self.difference_cosine = np.clip(dot(incident, half), 0, 1)
         self.schlick = np.power(1 - self.difference_cosine, 5)
         self.denominator = 4 * incident[:, 2] * outgoing[:, 2]

@@ -10,6 +10,7 @@ import numpy as np
 from mdfconv.conversion import explain
 from mdfconv.conversion.explanation import remaining_error
 from mdfconv.distributions import Distribution
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.endpoint import Endpoint, endpoint, exact_route
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import Parameter
@@ -46,16 +47,16 @@ class LobeMixture(Distribution):
     def _at_normal(self, parameter: Array) -> Array:
         return self._sum(self._peaks(parameter))
 
-    def _lobe(self, beta: Array, parameter: Array, out: Array | None = None) -> Array:
-        values = (self._one._lobe(beta, factor * parameter) for _, factor in self._parts)
+    def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
+        values = (self._one._lobe(angles, factor * parameter) for _, factor in self._parts)
         peaks = self._peaks(parameter)
         value = self._sum(peak * value for peak, value in zip(peaks, values, strict=True))
         return np.divide(value, self._sum(peaks), out=out)
 
-    def _lobe_and_log_slope(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
+    def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         height = fall = np.zeros(1)
         for peak, (_, factor) in zip(self._peaks(parameter), self._parts, strict=True):
-            value, slope = self._one._lobe_and_log_slope(beta, factor * parameter)
+            value, slope = self._one._lobe_and_log_slope(angles, factor * parameter)
             slope = slope + self._one._log_slope_at_normal(factor * parameter)
             height, fall = height + peak * value, fall + peak * value * slope
         value = height / self._at_normal(parameter)
@@ -67,8 +68,8 @@ class LobeMixture(Distribution):
         rise = self._sum(peak * slope for peak, slope in zip(peaks, slopes, strict=True))
         return rise / self._sum(peaks)
 
-    def _cumulative(self, beta: Array, parameter: Array) -> tuple[Array, Array]:
-        shares = [self._one._cumulative(beta, factor * parameter) for _, factor in self._parts]
+    def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
+        shares = [self._one._cumulative(angles, factor * parameter) for _, factor in self._parts]
         weights = [weight for weight, _ in self._parts]
         below, above = (np.tensordot(weights, share, 1) for share in zip(*shares, strict=True))
         return below, above

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from mdfconv.conversion import method_named
 from mdfconv.conversion.explanation import remaining_error
 from mdfconv.distributions import Distribution, distribution
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
@@ -322,26 +323,26 @@ def curve_fit_loop(
     """
     from scipy.optimize import OptimizeWarning, curve_fit
 
-    beta, weight = LobeQuadrature(np.arctan(bounded_tangent(source, parameter))).nodes(
+    angles, weight = LobeQuadrature(np.arctan(bounded_tangent(source, parameter))).nodes(
         np.arange(parameter.size)
     )
     column = parameter[:, None]
     peak = source.maximum(column, normalized=metric.normalized)
-    reference = metric.signal(source, beta, column, peak)
+    reference = metric.signal(source, angles, column, peak)
     starts = target.from_half_tangent(source.half_tangent(parameter))
     results = np.full(parameter.size, np.nan)
     with np.errstate(all="ignore"), warnings.catch_warnings():
-        sigma = 1 / np.sqrt(weight * metric.weight(beta))
+        sigma = 1 / np.sqrt(weight * metric.weight(angles))
         # A perfect fit has no covariance to speak of.
         warnings.simplefilter("ignore", OptimizeWarning)
         for row in np.flatnonzero(~np.isnan(starts)).tolist():
 
-            def signal(angle: Array, log_parameter: float, row: int = row) -> Array:
-                return metric.signal(target, angle, np.exp([log_parameter]), peak[row])
+            def signal(beta: Array, log_parameter: float, row: int = row) -> Array:
+                return metric.signal(target, Angles(beta), np.exp([log_parameter]), peak[row])
 
             start = [np.log(starts[row])]
             try:
-                fitted, _ = curve_fit(signal, beta[row], reference[row], start, sigma[row])
+                fitted, _ = curve_fit(signal, angles.beta[row], reference[row], start, sigma[row])
             except RuntimeError:
                 continue
             results[row] = np.exp(fitted[0])

@@ -10,6 +10,7 @@ import numpy as np
 
 from mdfconv.conversion import convert
 from mdfconv.distributions import distribution
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics import Metric, metric_named
@@ -88,8 +89,10 @@ def curves(
     source = distribution(reference)
     beta = np.linspace(0, float(lobe_extent(source, arrays[reference])[0]), points)
     peak = source.maximum(arrays[reference], normalized=metric.normalized)
+    angles = Angles(beta)
     values = {
-        name: metric.signal(distribution(name), beta, value, peak) for name, value in arrays.items()
+        name: metric.signal(distribution(name), angles, value, peak)
+        for name, value in arrays.items()
     }
     errors = {
         name: (value - values[reference]) / values[reference].max()

@@ -6,6 +6,7 @@ import pytest
 from scipy.special import eval_legendre, roots_legendre
 
 import mdfconv
+from mdfconv.distributions.angles import Angles
 from mdfconv.fitting.metrics.base import Energy, Environment
 from mdfconv.fitting.solve import fit
 
@@ -47,8 +48,9 @@ def test_the_distance_is_the_sum_over_the_power_spectrum(
     degree = np.arange(1, 600)
     factor = np.array([mass @ eval_legendre(n, np.cos(2 * beta)) for n in degree])
     total = np.sum((2 * degree + 1) * power(degree) * factor**2)
-    signals = [metric.signal(lobe, beta, np.full(1, p), np.ones(1)) for lobe, p in lobes]
-    integral = weight @ (metric.weight(beta) * (signals[1] - signals[0]) ** 2)
+    angles = Angles(beta)
+    signals = [metric.signal(lobe, angles, np.full(1, p), np.ones(1)) for lobe, p in lobes]
+    integral = weight @ (metric.weight(angles) * (signals[1] - signals[0]) ** 2)
     # With C = 1 the identity has π² sin 2β, the energy metric's weight is π sin 2β.
     integral *= np.pi if isinstance(metric, Energy) else 1
     assert integral == pytest.approx(total, rel=1e-8)
@@ -98,7 +100,9 @@ def test_a_constant_ends_at_the_legal_range():
 @pytest.mark.parametrize("m", [0.01, 0.3, 1.0, 3.9, 4.1, 50.0, 1e4])
 def test_slopes_of_the_cumulative_form_of_gauss(m):
     beta = np.array([[0.3 * min(m, 1), 0.7 * min(m, 1), 1.2]])
-    _, slopes = mdfconv.distribution("gauss").cumulative_with_slope(beta, np.full((1, 1), m))
+    _, slopes = mdfconv.distribution("gauss").cumulative_with_slope(
+        Angles(beta), np.full((1, 1), m)
+    )
     weight = lambda b: mp.exp(-((b / m) ** 2)) * mp.sin(2 * b)  # noqa: E731
     second = lambda b: 2 * (b / m) ** 2 * weight(b)  # noqa: E731
     with mp.workdps(40):

@@ -8,6 +8,7 @@ import pytest
 
 import mdfconv
 from mdfconv.distributions import one_parameter_distributions
+from mdfconv.distributions.angles import Angles
 from mdfconv.fitting import maps
 from mdfconv.fitting.metrics import list_metrics, metric_named
 from mdfconv.fitting.metrics.base import Display, Energy, Unit
@@ -264,7 +265,9 @@ def test_slopes(entry, normalized):
         width = entry.half_width(parameter)
         beta = np.array([[0, 0.3, 1, 2.2]]) * (0.4 if np.isnan(width) else width)
         beta = np.minimum(beta, 1.5)
-        value, slope = entry.with_slope(beta, np.array([[parameter]]), normalized=normalized)
+        value, slope = entry.with_slope(
+            Angles(beta), np.array([[parameter]]), normalized=normalized
+        )
         at_normal = slope_at_normal(entry, name, parameter, gamma) if normalized else 0
         step = mp.mpf(10) ** -20
         for place, angle in enumerate(beta[0]):

@@ -13,6 +13,7 @@ from scipy.special import erf
 
 import mdfconv
 from mdfconv.conversion.explanation import remaining_error
+from mdfconv.distributions.angles import Angles
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.measured.brdf_fit import fit_distribution
 from mdfconv.measured.materials import snippets
@@ -524,7 +525,9 @@ def test_the_mixture_is_the_sum_of_its_lobes():
             1e-5,
             axis=0,
         )[1]
-        value, slope = mixture.with_slope(beta[None], np.full((1, 1), alpha), normalized=True)
+        value, slope = mixture.with_slope(
+            Angles(beta[None]), np.full((1, 1), alpha), normalized=True
+        )
         assert slope[0] / value[0] == pytest.approx(wanted, rel=1e-6, abs=1e-8)
 
 

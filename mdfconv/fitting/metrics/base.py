@@ -12,6 +12,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mdfconv.distributions import Distribution
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.evaluation import Array, gauss_panels
 from mdfconv.distributions.parameter import Parameter, number_text, percent_hint
 from mdfconv.errors import MdfconvError
@@ -87,8 +88,8 @@ class Metric(ABC):
         return (self,)
 
     @abstractmethod
-    def weight(self, beta: Array) -> Array:
-        """Return w at an angle, radians."""
+    def weight(self, angles: Angles) -> Array:
+        """Return w at angles."""
 
     def quadrature(self, half_width: Array) -> Quadrature:
         """Return where S is sampled, for lobes of which β_half is the narrowest, radians."""
@@ -116,18 +117,18 @@ class Metric(ABC):
         """Return dS/d(D/P)."""
         return 1.0
 
-    def signal(self, mdf: Distribution, beta: Array, parameter: Array, peak: Array) -> Array:
-        """Return S of a distribution for P = `peak`; `beta` has the shape of the result."""
+    def signal(self, mdf: Distribution, angles: Angles, parameter: Array, peak: Array) -> Array:
+        """Return S of a distribution for P = `peak`."""
         with np.errstate(all="ignore"):
-            value = mdf.shape(beta, parameter)
+            value = mdf.shape(angles, parameter)
             value *= mdf.maximum(parameter, normalized=self.normalized) / peak
         return self.encode(value)
 
     def signal_and_slope(
-        self, distribution: Distribution, beta: Array, parameter: Array, peak: Array
+        self, distribution: Distribution, angles: Angles, parameter: Array, peak: Array
     ) -> tuple[Array, Array]:
-        """Return S and ∂S/∂ ln p; `beta` has shape (n, k), `parameter` p and `peak` (n, 1)."""
-        value, slope = distribution.with_slope(beta, parameter, normalized=self.normalized)
+        """Return S and ∂S/∂ ln p at angles, shape (n, k); `parameter` p and `peak` have (n, 1)."""
+        value, slope = distribution.with_slope(angles, parameter, normalized=self.normalized)
         if self.normalized:
             value /= peak
             slope *= self.encode_slope(value) / peak
@@ -145,9 +146,9 @@ class Unit(Metric):
     quantity = "unit form D / max D"
     normalized = False
 
-    def weight(self, beta: Array) -> Array:
+    def weight(self, angles: Angles) -> Array:
         """Return 1."""
-        return np.broadcast_to(1.0, beta.shape)
+        return np.broadcast_to(1.0, angles.shape)
 
 
 class Energy(Metric):
@@ -161,9 +162,9 @@ class Energy(Metric):
     quantity = "normalized D / max D of the reference"
     normalized = True
 
-    def weight(self, beta: Array) -> Array:
+    def weight(self, angles: Angles) -> Array:
         """Return 2π sin β cos β."""
-        return np.pi * np.sin(2 * beta)
+        return 2 * np.pi * angles.tangent / (1 + angles.tangent_square)
 
 
 # The sRGB encoding (IEC 61966-2-1) is linear up to here.
@@ -265,22 +266,22 @@ class Environment(Metric):
     quantity = "share of the facets within β, beyond a uniform lobe's"
     normalized = True
 
-    def weight(self, beta: Array) -> Array:
+    def weight(self, angles: Angles) -> Array:
         """Return 4 / sin 2β."""
         # A panel of no width lies at 0.
-        return 4 / np.maximum(np.sin(2 * beta), 1e-300)
+        return 2 * (1 + angles.tangent_square) / np.maximum(angles.tangent, 1e-300)
 
-    def signal(self, mdf: Distribution, beta: Array, parameter: Array, peak: Array) -> Array:
+    def signal(self, mdf: Distribution, angles: Angles, parameter: Array, peak: Array) -> Array:
         """Return F − sin²β."""
         with np.errstate(all="ignore"):
-            return self.signal_and_slope(mdf, beta, parameter, peak)[0]
+            return self.signal_and_slope(mdf, angles, parameter, peak)[0]
 
     def signal_and_slope(
-        self, distribution: Distribution, beta: Array, parameter: Array, peak: Array
+        self, distribution: Distribution, angles: Angles, parameter: Array, peak: Array
     ) -> tuple[Array, Array]:
         """Return F − sin²β and ∂F/∂ ln p."""
-        share, slope = distribution.cumulative_with_slope(beta, parameter)
-        return share - np.square(np.sin(beta)), slope
+        share, slope = distribution.cumulative_with_slope(angles, parameter)
+        return share - angles.sine_square, slope
 
     def ratio(self, source: Distribution, target: Distribution) -> float | None:
         """Return the constant by which parameters convert, if both scale with the slope."""
@@ -300,11 +301,12 @@ def _ratio(source: Distribution, target: Distribution) -> float:
 
     edges = np.linspace(-_LOG_REACH, _LOG_REACH, _PANELS + 1)
     log_tangent, weight = gauss_panels(edges[None, :], _ORDER)
-    share, _ = source.cumulative_with_slope(np.arctan(np.exp(log_tangent)), np.ones((1, 1)))
+    angles = Angles(tangent=np.exp(log_tangent))
+    share, _ = source.cumulative_with_slope(angles, np.ones((1, 1)))
 
     def slope(log_ratio: float) -> float:
         # The target at parameter 1, moved along the axis: a legal range does not matter.
-        moved = np.arctan(np.exp(log_tangent - log_ratio))
+        moved = Angles(tangent=np.exp(log_tangent - log_ratio))
         other, fall = target.cumulative_with_slope(moved, np.ones((1, 1)))
         return float(np.sum(weight * (other - share) * fall))
 

@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 
 from mdfconv.distributions import Distribution
+from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.metrics.base import Metric
@@ -59,15 +60,15 @@ class LightMetric(Metric):
         """Return the name with the path of the map."""
         return f"{self.name}:{self._label}"
 
-    def weight(self, beta: Array) -> Array:
+    def weight(self, angles: Angles) -> Array:
         """Return (2l+1) C_l of the degrees."""
-        return np.broadcast_to(self._weight, beta.shape)
+        return np.broadcast_to(self._weight, angles.shape)
 
     def quadrature(self, half_width: Array) -> Quadrature:
         """Return the degrees."""
         return _Degrees(self._lobes.degree)
 
-    def signal(self, mdf: Distribution, beta: Array, parameter: Array, peak: Array) -> Array:
+    def signal(self, mdf: Distribution, angles: Angles, parameter: Array, peak: Array) -> Array:
         """Return k_l."""
         with np.errstate(all="ignore"):
             # A row at a time stays in the cache.
@@ -75,7 +76,7 @@ class LightMetric(Metric):
         return np.stack(rows)
 
     def signal_and_slope(
-        self, distribution: Distribution, beta: Array, parameter: Array, peak: Array
+        self, distribution: Distribution, angles: Angles, parameter: Array, peak: Array
     ) -> tuple[Array, Array]:
         """Return k_l and ∂k_l/∂ ln p."""
         return self._lobes.with_slope(distribution, parameter)
@@ -89,7 +90,7 @@ class _Degrees:
 
     def nodes(self, rows: Indices, breaks: Breaks = NO_BREAKS) -> Samples:
         shape = rows.size, self._degree.size
-        return np.broadcast_to(self._degree, shape), np.broadcast_to(1.0, shape)
+        return Angles(np.broadcast_to(self._degree, shape)), np.broadcast_to(1.0, shape)
 
     def coarse(self, rows: Indices, *, fine: bool = False) -> Samples:
         return self.nodes(rows)

@@ -8,11 +8,14 @@ from typing import Any, Self
 
 import numpy as np
 
-from mdfconv.distributions.elementary import log1p, tangent_square, versine
+from mdfconv.distributions import elementary
 from mdfconv.distributions.evaluation import Array, Indices, Mask
 
 # (1 + tan²β)² stays finite.
 _LARGEST_SQUARE = {np.dtype(np.float32): 1e18, np.dtype(np.float64): 1e150}
+# Up to here cos β is more than ¼.
+_FAR_SQUARE = 1.7
+_HORIZON_SQUARE = {dtype: np.square(dtype.type(0.5 * np.pi)) for dtype in _LARGEST_SQUARE}
 
 
 class Angles:
@@ -25,17 +28,10 @@ class Angles:
     Parameters
     ----------
     beta : numpy.ndarray, optional
-        β, radians, [0, π/2].
+        β, radians. All functions are even.
     tangent : numpy.ndarray, optional
         tan β in the place of β, from 0, finite.
-
-    Attributes
-    ----------
-    beyond : numpy.ndarray of bool or None
-        Where facets face away from the surface, so that D is 0; None for nowhere.
     """
-
-    beyond: Mask | None = None
 
     def __init__(self, beta: Array | None = None, *, tangent: Array | None = None) -> None:
         given = {"beta": beta, "tangent": tangent}
@@ -43,33 +39,17 @@ class Angles:
         self.__dict__ |= {name: array for name, array in given.items() if array is not None}
 
     @classmethod
-    def of_angle(cls, beta: Array) -> Self:
-        """Return those of any β, radians: the functions are even, and D is 0 beyond π/2."""
-        # Read as integers, floats from 0 to π/2 keep their order and all others (negative, NaN)
-        # are larger: one reduction shows that nothing needs a closer look.
-        horizon = beta.dtype.type(np.pi / 2)
-        bits = np.dtype(f"u{horizon.itemsize}")
-        if not beta.size or beta.view(bits).max() <= horizon.view(bits):
-            return cls(beta)
-        magnitude = np.abs(beta)
-        angles = cls(magnitude)
-        angles.beyond = magnitude > horizon
-        return angles
-
-    @classmethod
     def of_cosine(cls, cosine: Array) -> Self:
-        """Return those of any cos β, of which 1 may be exceeded by rounding; D is 0 below 0."""
-        cosine = np.minimum(cosine, 1)
-        angles = cls()
-        square = (1 - cosine) * (1 + cosine) / np.square(cosine)
-        angles.__dict__ |= {"tangent_square": _bounded(square), "versine": 1 - cosine}
-        if not cosine.min(initial=0) >= 0:
-            angles.beyond = cosine < 0
+        """Return those of any cos β, of which 1 may be exceeded by rounding."""
+        angles, bounded = cls(), np.minimum(cosine, 1)
+        square = (1 - bounded) * (1 + bounded) / np.square(bounded)
+        angles.__dict__ |= {"tangent_square": _bounded(square), "versine": 1 - bounded}
+        angles.__dict__["beyond"] = None if cosine.min(initial=0) >= 0 else cosine < 0
         return angles
 
     @classmethod
     def of_slope(cls, slope: Array) -> Self:
-        """Return those of any tan β, which is taken as even; infinite at π/2."""
+        """Return those of any tan β, infinite at π/2."""
         angles = cls(tangent=np.abs(slope))
         angles.__dict__["tangent_square"] = _bounded(np.square(slope))
         return angles
@@ -77,7 +57,11 @@ class Angles:
     def __getitem__(self, index: Indices | Mask | tuple[Any, ...]) -> Angles:
         """Return some of the angles."""
         part = Angles()
-        part.__dict__ |= {name: array[index] for name, array in self.__dict__.items()}
+        part.__dict__ |= {
+            name: array[index]
+            for name, array in self.__dict__.items()
+            if isinstance(array, np.ndarray)
+        }
         return part
 
     @property
@@ -86,37 +70,83 @@ class Angles:
         return next(iter(self.__dict__.values())).shape
 
     @cached_property
+    def beyond(self) -> Mask | None:
+        """Where |β| exceeds π/2: the facet faces away, and D is 0. None for nowhere."""
+        if "beta" not in self.__dict__:
+            return None
+        horizon = _HORIZON_SQUARE[self.beta.dtype]
+        # Of NaN it is not known.
+        return None if self._largest <= horizon else self.beta_square > horizon
+
+    @cached_property
+    def _largest(self) -> Any:
+        """Return the largest β², a number."""
+        return self.beta_square.max(initial=0)
+
+    @cached_property
     def beta(self) -> Array:
         """Return β, radians."""
         return np.arctan(self.tangent)
 
     @cached_property
+    def beta_square(self) -> Array:
+        """Return β²."""
+        return np.square(self.beta)
+
+    @cached_property
     def tangent(self) -> Array:
-        """Return tan β."""
+        """Return |tan β|."""
         return np.sqrt(self.tangent_square)
 
     @cached_property
     def tangent_square(self) -> Array:
-        """Return tan²β, the variable in which most lobes keep their digits up to π/2."""
-        return np.square(self.tangent) if "tangent" in self.__dict__ else tangent_square(self.beta)
+        """Return tan²β, which has all digits at 0 and at π/2."""
+        if "tangent" in self.__dict__:
+            return np.square(self.tangent)
+        return elementary.tangent_square(self.beta, self.beta_square)
 
     @cached_property
     def sine_square(self) -> Array:
         """Return sin²β."""
+        if "beta" in self.__dict__:
+            return elementary.sine_square(self.beta_square)
         return self.tangent_square / (1 + self.tangent_square)
 
     @cached_property
     def versine(self) -> Array:
         """Return 1 − cos β."""
         if "beta" in self.__dict__:
-            return versine(self.beta)
+            return elementary.versine(self.beta_square)
         square = 1 + self.tangent_square
         return self.tangent_square / (square + np.sqrt(square))
 
     @cached_property
-    def log_secant_square(self) -> Array:
-        """Return −2 ln cos β."""
-        return log1p(self.tangent_square)
+    def cosine(self) -> Array:
+        """Return |cos β|, which has all digits at π/2."""
+        if "beta" in self.__dict__:
+            return self._cosine_and_near[0]
+        return 1 / np.sqrt(1 + self.tangent_square)
+
+    @cached_property
+    def _cosine_and_near(self) -> tuple[Array, Mask | None]:
+        if self._largest <= _FAR_SQUARE:
+            return 1 - self.versine, None
+        return elementary.cosine(self.beta, self.versine)
+
+    @cached_property
+    def cosine_square(self) -> Array:
+        """Return cos²β."""
+        if "beta" in self.__dict__:
+            return np.square(self.cosine)
+        return 1 / (1 + self.tangent_square)
+
+    @cached_property
+    def log_secant(self) -> Array:
+        """Return −ln cos β, which has all digits at 0 and at π/2."""
+        if "beta" in self.__dict__:
+            cosine, near = self._cosine_and_near
+            return elementary.minus_log_of_difference(cosine, self.versine, near)
+        return 0.5 * elementary.log1p(self.tangent_square)
 
 
 def _bounded(square: Array) -> Array:
@@ -126,7 +156,7 @@ def _bounded(square: Array) -> Array:
 
 # What angles may be given as.
 VARIABLES: Mapping[str, Callable[[Array], Angles]] = {
-    "angle": Angles.of_angle,
+    "angle": Angles,
     "cosine": Angles.of_cosine,
     "slope": Angles.of_slope,
 }

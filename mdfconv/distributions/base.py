@@ -495,9 +495,7 @@ class Distribution(ABC):
         if self.scales_with_slope:
             # F is a function of tan β / p, and dF = 2π D sin β cos β dβ.
             lobe = self._lobe(angles, parameter) * self._at_normal(parameter)
-            # sin β cos β = tan β cos²β
-            product = angles.tangent_square / np.square(1 + angles.tangent_square)
-            return share, -2 * np.pi * lobe * product
+            return share, -2 * np.pi * lobe * angles.sine_square * angles.cosine_square
         above, below = (self._cumulative(angles, parameter * np.exp(s))[0] for s in (_STEP, -_STEP))
         return share, (above - below) / (2 * _STEP)
 

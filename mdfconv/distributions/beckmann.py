@@ -39,15 +39,12 @@ class Beckmann(base.AlphaDistribution, base.AnisotropicDistribution):
 
     Unit form, with t = tan β::
 
-        D̄ = e^(−t²/m²) / cos⁴β = (1+t²)² e^(−t²/m²)   for m ≤ 1/√2,
+        D̄ = e^(−t²/m²) / cos⁴β   for m ≤ 1/√2,
 
     divided by 4m⁴ e^(1/m²−2) for m > 1/√2, where the maximum lies at t² = 2m² − 1 and no
     longer at β = 0. Normalized by 1/(π m²). Anisotropic: t²/m² becomes
     t² (cos²φ/m_x² + sin²φ/m_y²) and m² in the constant becomes m_x m_y.
     F = 1 − e^(−t²/m²); Smith's Λ is that of Heitz 2014, eq. (66), exact.
-
-    The form in t keeps every digit up to β = π/2 and needs one
-    trigonometric function instead of two.
     """
 
     name = "beckmann"
@@ -67,14 +64,14 @@ class Beckmann(base.AlphaDistribution, base.AnisotropicDistribution):
     )
 
     def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
-        return _exp_times_secant_power(angles, -inverse_square(parameter), out)
+        return _exp_over_cosine_power(angles, -inverse_square(parameter), out)
 
     def _lobe_pair(self, angles: Angles, x: Array, y: Array, phi: Array, out: Array) -> None:
-        _exp_times_secant_power(angles, -slope_scale(x, y, phi), out)
+        _exp_over_cosine_power(angles, -slope_scale(x, y, phi), out)
 
     def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         scale = inverse_square(parameter)
-        value = _exp_times_secant_power(angles, -scale, None)
+        value = _exp_over_cosine_power(angles, -scale, None)
         return value, angles.tangent_square * (2 * scale)
 
     def mode(self, parameter: Array) -> Array:
@@ -132,8 +129,8 @@ def slope_scale(x: Array, y: Array, phi: Array) -> Array:
     return along_x + np.square(np.sin(phi)) * inverse_square(y)
 
 
-def _exp_times_secant_power(angles: Angles, scale: Array, out: Array | None) -> Array:
-    """Return (1+t²)² e^(k t²) for k = `scale`."""
+def _exp_over_cosine_power(angles: Angles, scale: Array, out: Array | None) -> Array:
+    """Return e^(k t²) / cos⁴β for k = `scale`."""
     value = exp_of_product(angles.tangent_square, scale, out)
     power = 1 + angles.tangent_square
     np.square(power, out=power)

@@ -18,10 +18,10 @@ class BlinnPhong(base.Distribution):
 
     Unit form::
 
-        D̄ = cos^N β = exp(−½ N ln(1 + tan²β)).
+        D̄ = cos^N β = exp(N ln cos β).
 
-    Normalized by (N+2)/(2π); F = 1 − cos^(N+2) β. The tangent keeps the digits both near β = 0,
-    where ln cos β = ln(1 − …) loses them, and near π/2, where ln(1 − sin²β) does.
+    Normalized by (N+2)/(2π); F = 1 − cos^(N+2) β. Near β = 0 the digits of ln cos β are those of
+    1 − cos β, which the cosine has lost.
     """
 
     name = "blinn-phong"
@@ -59,25 +59,25 @@ class BlinnPhong(base.Distribution):
     )
 
     def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
-        return exp_of_product(angles.log_secant_square, -0.5 * parameter, out)
+        return exp_of_product(angles.log_secant, -parameter, out)
 
     def _at_normal(self, parameter: Array) -> Array:
         return (parameter + 2) / (2 * np.pi)
 
     def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
-        return self._lobe(angles, parameter), angles.log_secant_square * (-0.5 * parameter)
+        return self._lobe(angles, parameter), angles.log_secant * -parameter
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return parameter / (parameter + 2)
 
     def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
-        arguments = angles.log_secant_square, -0.5 * (parameter + 2)
+        arguments = angles.log_secant, -(parameter + 2)
         return one_minus_exp_of_product(*arguments), exp_of_product(*arguments)
 
     def cumulative_with_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         """Return F and ∂F/∂ ln N, as in the base class."""
-        share = one_minus_exp_of_product(angles.log_secant_square, -0.5 * (parameter + 2))
-        return share, (0.5 * parameter) * angles.log_secant_square * (1 - share)
+        share = one_minus_exp_of_product(angles.log_secant, -(parameter + 2))
+        return share, parameter * angles.log_secant * (1 - share)
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
         exponent = 2 * base.negative_log_tail(lobe, tail) / (parameter + 2)

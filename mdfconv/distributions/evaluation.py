@@ -24,11 +24,11 @@ Indices: TypeAlias = NDArray[np.integer[Any]]
 Mask: TypeAlias = NDArray[np.bool_]
 Kernel: TypeAlias = Callable[..., Any]
 
-# Large enough to hide the cost of a call, small enough for the intermediates to stay in cache.
-_LARGEST_BLOCK = 65536
-_SMALLEST_BLOCK = 512
-# Smaller arrays get smaller blocks, so that the intermediates stay a fraction of the result.
-_BLOCKS_AT_LEAST = 24
+# Large enough to hide the cost of a call, small enough for the intermediates to stay in cache; no
+# power of 2, which would put the same elements of all arrays into the same lines of the cache.
+_BLOCK = 100_000
+# Bytes that the allocator keeps, at most.
+_KEPT = 31 << 20
 # Smaller arrays are done sooner than threads are started; a few parts for each thread even out
 # what the others are kept from.
 _WORTH_THREADS, _PARTS_A_THREAD = 1 << 20, 4
@@ -82,7 +82,7 @@ def evaluate(kernel: Kernel, angles: ArrayLike, *operands: ArrayLike, threads: i
     kernel : callable
         ``kernel(angles, *operands, out)`` maps one-dimensional blocks to a block of values,
         which it writes to `out`. The block of angles is as long as `out`; a parameter that
-        is constant over the block arrives with one element. They must not be written to.
+        is constant over the block arrives as a number. They must not be written to.
     angles : array_like
         The angles, in the kernel's variable.
     *operands : array_like
@@ -111,8 +111,10 @@ def evaluate(kernel: Kernel, angles: ArrayLike, *operands: ArrayLike, threads: i
             op_flags=[["readonly"]] * len(arrays) + [["writeonly", "allocate"]],
             op_dtypes=[dtype] * (len(arrays) + 1),
             casting="same_kind",
-            buffersize=min(_LARGEST_BLOCK, max(_SMALLEST_BLOCK, size // _BLOCKS_AT_LEAST)),
+            buffersize=_BLOCK,
         )
+    if size > _BLOCK:
+        _keep_memory()
     with iterator:
         in_parts(partial(_run, kernel, iterator), size, threads)
         result: Any = iterator.operands[-1]
@@ -123,13 +125,23 @@ def evaluate(kernel: Kernel, angles: ArrayLike, *operands: ArrayLike, threads: i
         return result.astype(result_dtype)[()]
 
 
+@cache
+def _keep_memory() -> None:
+    """Let the allocator keep the memory of freed blocks.
+
+    The GNU C library returns large blocks to the system, and fresh pages cost more than what is
+    computed in them. Once a block of some size has been freed, it keeps what is smaller.
+    """
+    np.empty(_KEPT, np.uint8)
+
+
 def _run(kernel: Kernel, iterator: Any, start: int, end: int) -> None:
     """Evaluate a kernel on a part of an iterator's range."""
     part = iterator.copy()
     part.iterrange = start, end
     with part, np.errstate(all="ignore"):
         for angles, *rest, out in part:
-            kernel(angles, *(b[:1] if b.strides[0] == 0 else b for b in rest), out)
+            kernel(angles, *(b[0] if b.strides[0] == 0 else b for b in rest), out)
 
 
 def worth_threads(size: int, threads: int) -> bool:

@@ -65,14 +65,14 @@ class Gauss(Distribution):
     )
 
     def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
-        return exp_of_product(np.square(angles.beta), -inverse_square(parameter), out)
+        return exp_of_product(angles.beta_square, -inverse_square(parameter), out)
 
     def _at_normal(self, parameter: Array) -> Array:
         return 1 / (np.pi * _sine_integral(parameter))
 
     def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
-        square, scale = np.square(angles.beta), inverse_square(parameter)
-        return exp_of_product(square, -scale), square * (2 * scale)
+        scale = inverse_square(parameter)
+        return exp_of_product(angles.beta_square, -scale), angles.beta_square * (2 * scale)
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         # −∂ ln Z/∂ ln m as a mean: differences of Faddeeva functions cancel for large m.

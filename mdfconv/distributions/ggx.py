@@ -30,11 +30,11 @@ class GGX(base.AlphaDistribution, base.AnisotropicDistribution):
 
     Unit form, with t = tan β::
 
-        D̄ = [α² / (α² + (1−α²) sin²β)]² = [(1+t²) / (1+t²/α²)]².
+        D̄ = [α² / (α² + (1−α²) sin²β)]² = 1 / (1 + (1/α²−1) sin²β)².
 
-    Normalized by 1/(π α²). Anisotropic: t²/α² becomes t² (cos²φ/α_x² + sin²φ/α_y²) and α²
+    Normalized by 1/(π α²). Anisotropic: 1/α² becomes cos²φ/α_x² + sin²φ/α_y² and α²
     in the constant becomes α_x α_y (Burley 2012). The printed cos²β (α²−1) + 1 loses every
-    digit for smooth surfaces; the tangent form has only positive terms. F = t²/(t²+α²); Smith's
+    digit for smooth surfaces; the second form has only positive terms. F = t²/(t²+α²); Smith's
     Λ = ½ (√(1 + α² tan²θ) − 1).
     """
 
@@ -106,15 +106,10 @@ def trowbridge_reitz_lambda(slope: Array) -> Array:
 
 
 def trowbridge_reitz(angles: Angles, scale: Array, out: Array | None) -> Array:
-    """Return [(1+t²) / (1+k t²)]² for k = `scale` = 1/α².
-
-    As [1/k + (1−1/k) / (1+k t²)]² it takes one pass over memory less.
-    """
-    value = np.multiply(angles.tangent_square, scale, out=out)
+    """Return 1 / (1 + (k−1) sin²β)² for k = `scale` = 1/α²."""
+    value = np.multiply(angles.sine_square, scale - 1, out=out)
     value += 1
-    floor = 1 / scale
-    np.divide(1 - floor, value, out=value)
-    value += floor
+    np.divide(1, value, out=value)
     return np.square(value, out=value)
 
 

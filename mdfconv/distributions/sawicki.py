@@ -20,7 +20,7 @@ class Sawicki(base.Distribution):
         D̄ = 256 c / ((1−N) c + N + 3)⁴ = c / (1 + ¼ (N−1) v)⁴.
 
     Normalized by 96 (3+N) / (256 π); F = 1 − [c / (1 + ¼ (N−1) v)]³. The second form has no
-    difference of large numbers; v = t²/(s(1+s)) and c = 1/s come from t = tan β, s = √(1+t²).
+    difference of large numbers.
     """
 
     name = "sawicki"
@@ -44,43 +44,39 @@ class Sawicki(base.Distribution):
     )
 
     def _lobe(self, angles: Angles, parameter: Array, out: Array | None = None) -> Array:
-        drop, secant = _drop_and_secant(angles)
-        value = np.multiply(drop, 0.25 * (parameter - 1), out=out)
+        value = np.multiply(angles.versine, 0.25 * (parameter - 1), out=out)
         value += 1
         np.square(value, out=value)
         np.square(value, out=value)
-        value *= secant
-        return np.divide(1, value, out=value)
+        return np.divide(angles.cosine, value, out=value)
 
     def _at_normal(self, parameter: Array) -> Array:
         return 3 * (3 + parameter) / (8 * np.pi)
 
     def _lobe_and_log_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
-        drop, secant = _drop_and_secant(angles)
-        fall = drop * (0.25 * (parameter - 1))
+        fall = angles.versine * (0.25 * (parameter - 1))
         fall += 1
-        slope = drop * -parameter
+        slope = angles.versine * -parameter
         slope /= fall
         np.square(fall, out=fall)
         np.square(fall, out=fall)
-        fall *= secant
-        return np.divide(1, fall, out=fall), slope
+        return np.divide(angles.cosine, fall, out=fall), slope
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         return parameter / (parameter + 3)
 
     def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
-        drop, secant = _drop_and_secant(angles)
+        drop = angles.versine
         k = 0.25 * (parameter - 1)
         # With q = 1 − c/(1+kv) both are sums of positive terms.
-        ratio = 1 / (secant * (1 + k * drop))
+        ratio = angles.cosine / (1 + k * drop)
         q = (1 + k) * drop / (1 + k * drop)
         return q * (3 * ratio + q * q), ratio**3
 
     def cumulative_with_slope(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         """Return F and ∂F/∂ ln N_DS, as in the base class."""
         share, tail = self._cumulative(angles, parameter)
-        drop, _ = _drop_and_secant(angles)
+        drop = angles.versine
         return share, 0.75 * parameter * tail * drop / (1 + 0.25 * (parameter - 1) * drop)
 
     def _quantile(self, lobe: Array, tail: Array, parameter: Array) -> Array:
@@ -113,14 +109,6 @@ class Sawicki(base.Distribution):
 
     def _from_peak_alpha(self, alpha: Array) -> Array:
         return 8 / (3 * np.square(alpha)) - 3
-
-
-def _drop_and_secant(angles: Angles) -> tuple[Array, Array]:
-    """Return 1 − cos β and 1/cos β, both from tan²β: one needs its digits at 0, one at π/2."""
-    square = 1 + angles.tangent_square
-    secant = np.sqrt(square)
-    square += secant
-    return np.divide(angles.tangent_square, square, out=square), secant
 
 
 DISTRIBUTIONS = (Sawicki(),)

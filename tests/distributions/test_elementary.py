@@ -7,13 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mdfconv
-from mdfconv.distributions import elementary
+from mdfconv.distributions import coefficients, elementary
 from mdfconv.distributions.angles import Angles
 from tests import generate_elementary
 
 KINDS = [np.float32, np.float64]
 SMALLEST = {kind: float(np.finfo(kind).smallest_subnormal) for kind in KINDS}
 HALF_PI = {kind: kind(np.pi / 2) for kind in KINDS}
+FUNCTIONS = ("tangent_square", "sine_square", "versine", "cosine", "cosine_square", "log_secant")
 # An angle's digits are those of its distance to π/2, which the angle itself has not.
 ANGLES = st.one_of(
     st.floats(0, np.pi / 2),
@@ -45,22 +46,31 @@ def test_functions_of_an_angle(kind, angle):
     with mp.workdps(50):
         exact = mp.mpf(float(beta[0]))
         square = mp.tan(exact) ** 2
-        error = units(elementary.tangent_square(beta)[0], square, kind)
+        error = units(Angles(beta).tangent_square[0], square, kind)
         assert error <= (2.5 if exact < 0.3 else 13), error
-        error = units(elementary.versine(beta)[0], 2 * mp.sin(exact / 2) ** 2, kind)
+        assert units(Angles(beta).sine_square[0], mp.sin(exact) ** 2, kind) <= 5
+        assert units(Angles(beta).cosine[0], abs(mp.cos(exact)), kind) <= 6
+        if exact > 10 * SMALLEST[kind] ** 0.5:
+            with mp.workdps(400):
+                logarithm = -mp.log(abs(mp.cos(exact)))
+            assert units(Angles(beta).log_secant[0], logarithm, kind) <= 6
+        error = units(elementary.versine(np.square(beta))[0], 2 * mp.sin(exact / 2) ** 2, kind)
         assert error <= 2.5, error
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_ends_of_the_angles(kind):
     beta = np.array([0, SMALLEST[kind], np.finfo(kind).tiny, HALF_PI[kind]], kind)
-    square = elementary.tangent_square(beta)
+    square = Angles(beta).tangent_square
     np.testing.assert_array_equal(square[:3], 0)
     with mp.workdps(50):
         assert units(square[3], mp.tan(mp.mpf(float(beta[3]))) ** 2, kind) <= 13
-    np.testing.assert_array_equal(elementary.versine(beta)[:3], 0)
-    assert np.isnan(elementary.tangent_square(np.array([np.nan], kind))).all()
-    assert elementary.tangent_square(np.zeros((2, 0), kind)).shape == (2, 0)
+    np.testing.assert_array_equal(elementary.versine(np.square(beta))[:3], 0)
+    for angles in (Angles(np.array([np.nan], kind)), Angles(np.zeros((2, 0), kind))):
+        for name in FUNCTIONS:
+            value = getattr(angles, name)
+            assert value.shape == angles.shape
+            assert np.isnan(value).all()
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -108,9 +118,8 @@ def test_ends_of_the_exponentials(kind):
 
 
 def test_the_coefficients_are_those_of_the_script():
-    numerator, denominator = generate_elementary.rational("tangent", np.float64)
-    stored = elementary._TYPES[np.dtype(float)].coefficients.tangent
-    assert (tuple(numerator), tuple(denominator)) == stored
+    numerator, denominator = generate_elementary.rational("exponential", np.float64)
+    assert (tuple(numerator), tuple(denominator)) == coefficients.FLOAT64.exponential
 
 
 @pytest.mark.parametrize("name", [mdf.name for mdf in mdfconv.list_distributions()])
@@ -157,12 +166,10 @@ def test_angles_are_computed_once_and_taken_in_part():
     np.testing.assert_allclose(angles.tangent, np.tan(angles.beta), rtol=1e-14)
     np.testing.assert_allclose(angles.sine_square, np.sin(angles.beta) ** 2, rtol=1e-14)
     np.testing.assert_allclose(angles.versine, 1 - np.cos(angles.beta), rtol=1e-13)
-    np.testing.assert_allclose(
-        angles.log_secant_square, -2 * np.log(np.cos(angles.beta)), rtol=1e-12
-    )
+    np.testing.assert_allclose(angles.log_secant, -np.log(np.cos(angles.beta)), rtol=1e-12)
     part = angles[1:, :2]
     assert part.shape == (1, 2)
     np.testing.assert_array_equal(part.versine, angles.versine[1:, :2])
     from_slope = Angles(tangent=angles.tangent)
-    for name in ("beta", "tangent_square", "sine_square", "versine", "log_secant_square"):
+    for name in ("beta", *FUNCTIONS):
         np.testing.assert_allclose(getattr(from_slope, name), getattr(angles, name), rtol=1e-14)

@@ -164,7 +164,7 @@ class Energy(Metric):
 
     def weight(self, angles: Angles) -> Array:
         """Return 2π sin β cos β."""
-        return 2 * np.pi * angles.tangent / (1 + angles.tangent_square)
+        return 2 * np.pi * angles.tangent * angles.cosine_square
 
 
 # The sRGB encoding (IEC 61966-2-1) is linear up to here.
@@ -269,7 +269,7 @@ class Environment(Metric):
     def weight(self, angles: Angles) -> Array:
         """Return 4 / sin 2β."""
         # A panel of no width lies at 0.
-        return 2 * (1 + angles.tangent_square) / np.maximum(angles.tangent, 1e-300)
+        return 2 / np.maximum(angles.tangent * angles.cosine_square, 1e-300)
 
     def signal(self, mdf: Distribution, angles: Angles, parameter: Array, peak: Array) -> Array:
         """Return F − sin²β."""

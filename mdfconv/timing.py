@@ -22,6 +22,9 @@ Key = TypeVar("Key")
 
 # Medians that differ by a smaller share are the same on a machine that is not idle.
 NOISE = 0.1
+# glibc returns what is freed to the system, which costs page faults at the next allocation, until
+# it has freed a block of nearly this size: then it holds up to twice as much.
+_LARGEST_HEAP_BLOCK = 31 << 20  # bytes
 # On Windows processor time advances in steps of 16 ms.
 clock = time.perf_counter if os.name == "nt" else time.thread_time
 
@@ -50,8 +53,10 @@ def interleave(
     """Time functions in turns, and return the seconds of each by its name.
 
     `rounds` are counted after one that is not; the same place in two arrays is the same round.
-    `advance` is called with 1 after each round, the first one included.
+    `advance` is called with 1 after each round, the first one included. Results of a few megabytes
+    stay in the process, so that no time goes into page faults.
     """
+    np.empty(_LARGEST_HEAP_BLOCK, dtype=np.uint8)
     times = {name: np.empty(rounds + 1) for name in functions}
     order = list(functions)
     shuffle = random.Random(0).shuffle

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mdfconv.distributions.evaluation import Array
 from mdfconv.output.figures import encoded, line_style, new_figure
 from mdfconv.output.records import markdown_text
 from mdfconv.recommend import NUMPY, SHADER, front, unbeaten, use_text
@@ -71,8 +72,8 @@ def tables(measurements: Measurements) -> dict[str, list[Row]]:
             "distribution": row["distribution"],
             "type": row["precision"],
             "kernel ns": _times(row["kernel_ns"]),
-            **{f"{name} ns": _cell(row, f"{key}_ns", _times) for key, name in rivals.items()},
-            **{f"/ {name}": _cell(row, f"per_{key}", _rounded) for key, name in rivals.items()},
+            **{f"kernel / {rivals[key]}": _cell(row, f"per_{key}", _rounded) for key in rivals},
+            **{f"{rivals[key]} ns": _cell(row, f"{key}_ns", _times) for key in rivals},
         }
         for row in measured["kernels"]
     ]
@@ -118,8 +119,8 @@ def markdown_page(measurements: Measurements, picture: str | None = None) -> str
     if _timed(kernels, "drjit"):
         compiled = (
             f"\n  They take {_share(kernels, 'drjit', 'float32')} as long in float32 and "
-            f"{_share(kernels, 'drjit', 'float64')} in float64 as Dr.Jit does, which compiles "
-            "those expressions."
+            f"{_share(kernels, 'drjit', 'float64')} in float64 as Dr.Jit does,\n"
+            "  which compiles those expressions."
         )
     shown = f"![Error against cost, distributions and methods]({picture})" if picture else ""
     return fill(
@@ -308,47 +309,62 @@ def _label(axes: Any, points: Sequence[_Point]) -> None:
 
     Labels cover neither each other nor markers, quartiles, lines and leaders.
     """
-    from matplotlib.path import Path
     from matplotlib.text import Text
-    from matplotlib.transforms import Bbox
 
     shown = [point for point in points if np.isfinite(point.error)]
-    centers = axes.transData.transform([(point.cost.median, point.error) for point in shown])
-    point_size = axes.figure.dpi / 72
-    reach = (_MARKER_SIZE / 2 + 1) * point_size
-    markers = [Bbox([center - reach, center + reach]) for center in centers]
-    quartiles = [path for bars in axes.collections for path in bars.get_paths()]
-    drawn = [*quartiles, *(line.get_path() for line in axes.lines)]
-    lines = [axes.transData.transform_path(path) for path in drawn]
-    labels: list[Any] = []
-
-    def conflicts(box: Any, leader: Any, own: Any) -> int:
-        """Return how much a label and its leader cover."""
-        outside = sum(not axes.bbox.contains(*corner) for corner in box.get_points())
-        covered = box.count_overlaps([*markers, *labels])
-        covered += sum(line.intersects_bbox(box, filled=False) for line in lines)
-        apart = [marker for marker in markers if not marker.overlaps(own)]
-        led_over = sum(leader.intersects_bbox(one, filled=False) for one in (*apart, *labels))
-        return outside + covered + led_over
-
-    for point, center, own in zip(shown, centers, markers, strict=True):
+    places = np.reshape([(point.cost.median, point.error) for point in shown], (-1, 2))
+    room = _Room(axes, axes.transData.transform(places))
+    for number, point in enumerate(shown):
         text = axes.annotate(
             point.label, (point.cost.median, point.error), (0, 0), textcoords="offset points",
             ha="center", va="center", fontsize=_LABEL_SIZE, color=point.color, in_layout=False,
             arrowprops={"arrowstyle": "-", "color": "0.5", "linewidth": 0.5, "shrinkB": 0},
         )  # fmt: skip
-        size = Text.get_window_extent(text).size + _APART * point_size
-        fewest = np.inf
+        offset, distance = room.take(number, np.array(Text.get_window_extent(text).size))
+        text.set_position(offset)
+        text.arrow_patch.set_visible(distance > 0)
+
+
+class _Room:
+    """What is drawn in axes, in pixels: points at their centers, their quartiles, and lines."""
+
+    def __init__(self, axes: Any, centers: Array) -> None:
+        from matplotlib.transforms import Bbox
+
+        self.inside, self.centers = axes.bbox, centers
+        self.point_size = axes.figure.dpi / 72
+        self.reach = (_MARKER_SIZE / 2 + 1) * self.point_size
+        self.markers = [Bbox([center - self.reach, center + self.reach]) for center in centers]
+        quartiles = [path for bars in axes.collections for path in bars.get_paths()]
+        drawn = [*quartiles, *(line.get_path() for line in axes.lines)]
+        self.lines = [axes.transData.transform_path(path) for path in drawn]
+        self.labels: list[Any] = []
+
+    def take(self, number: int, size: Array) -> tuple[Array, int]:
+        """Take room for the label of a point; return its offset and its distance, in points."""
+        from matplotlib.path import Path
+        from matplotlib.transforms import Bbox
+
+        center, half = self.centers[number], (size + _APART * self.point_size) / 2
+        fewest: float = np.inf
         for distance, direction in product(_DISTANCES, _DIRECTIONS):
-            place = center + direction * (size / 2 + reach + distance * point_size)
-            box, leader = Bbox([place - size / 2, place + size / 2]), Path([center, place])
-            found = conflicts(box, leader, own)
+            place = center + direction * (half + self.reach + distance * self.point_size)
+            box, leader = Bbox([place - half, place + half]), Path([center, place])
+            found = self._covered(number, box, leader)
             if found < fewest:
                 fewest, best = found, (place, distance, box, leader)
             if not found:
                 break
         place, distance, box, leader = best
-        text.set_position((place - center) / point_size)
-        text.arrow_patch.set_visible(distance > 0)
-        labels.append(box)
-        lines.append(leader)
+        self.labels.append(box)
+        self.lines.append(leader)
+        return (place - center) / self.point_size, distance
+
+    def _covered(self, number: int, box: Any, leader: Any) -> int:
+        """Return how much a label of a point, and the line that leads to it, would cover."""
+        outside = sum(not self.inside.contains(*corner) for corner in box.get_points())
+        under = sum(line.intersects_bbox(box, filled=False) for line in self.lines)
+        own = self.markers[number]
+        apart = [marker for marker in self.markers if not marker.overlaps(own)]
+        crossed = sum(leader.intersects_bbox(one, filled=False) for one in apart + self.labels)
+        return outside + under + crossed + box.count_overlaps(self.markers + self.labels)

@@ -32,7 +32,7 @@ NOT_CONVERTED = "none"
 SHADER, NUMPY = "shader", "numpy"
 _COSTS = {SHADER: "for a shader, by operations", NUMPY: "for NumPy, by the time measured now"}
 # Errors that agree in so many decimals are the same: one lobe in several parameters.
-_DECIMALS = 6
+DECIMALS = 6
 
 
 def covering(source: Distribution, target: Distribution, metric: Metric) -> list[Method]:
@@ -226,12 +226,12 @@ def unbeaten(candidates: Sequence[tuple[float, int, float]], use: str) -> list[i
 
     Those are what nothing is both cheaper and nearer than, the cheapest first: the front of the
     costs of ``"shader"`` or ``"numpy"`` and the errors. Times that differ by noise are the same,
-    and of equal errors in NumPy the one with fewer operations counts as smaller.
+    and where errors are the same, too, fewer operations win.
     """
+    rounded = [(ns, operations, round(error, DECIMALS)) for ns, operations, error in candidates]
     if use == SHADER:
-        return front([(operations, error) for _, operations, error in candidates])
-    ranks = [(ns, round(error, _DECIMALS), operations) for ns, operations, error in candidates]
-    return front(ranks, NOISE)
+        return front([(operations, error) for _, operations, error in rounded])
+    return front([(ns, error, operations) for ns, operations, error in rounded], NOISE)
 
 
 def front(points: Sequence[tuple[float, ...]], tie: float = 0.0) -> list[int]:

@@ -12,7 +12,7 @@ import numpy as np
 from mdfconv.distributions.evaluation import Array
 from mdfconv.output.figures import encoded, line_style, new_figure
 from mdfconv.output.records import markdown_text
-from mdfconv.recommend import NUMPY, SHADER, front, unbeaten, use_text
+from mdfconv.recommend import DECIMALS, NUMPY, SHADER, front, unbeaten, use_text
 from mdfconv.studies.bench import LOOP, PLAIN_LOOP, PRECISIONS, Measurements, Row
 from mdfconv.studies.pages import fill
 from mdfconv.timing import NOISE, Spread
@@ -239,7 +239,8 @@ def _draw_substitutes(
     points = []
     for row in rows:
         name, color = row["distribution"], line_style(row["distribution"])["color"]
-        points.append(_Point(name, _cost(row, use), row["max_error"], color, "o"))
+        error = round(row["max_error"], DECIMALS)
+        points.append(_Point(name, _cost(row, use), error, color, "o"))
     _join(axes, [points[number] for number in unbeaten_rows], "0.6", "-")
     whose, programs = "{reference} {reference_parameter:.4g}".format_map(rows[0]), _PROGRAMS[use]
     axes.set(title=f"In the place of {whose}, for {programs[0]}", xlabel=programs[1])

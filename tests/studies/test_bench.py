@@ -414,8 +414,8 @@ def test_front_of_the_picture_is_what_recommend_takes():
     costs = [(15.0, 17, 0.0), (3.0, 23, 0.008), (3.2, 24, 0.007), (15.2, 5, 0.07), (2.0, 6, np.nan)]
     assert unbeaten(costs, "numpy") == [2, 0]
     assert unbeaten(costs, "shader") == [3, 0]
-    # The same lobe in another parameter, quicker by noise.
-    costs = [(10.0, 5, 0.0), (9.9, 24, 1e-16), (10.5, 6, 0.0)]
+    # The same lobe in another parameter, quicker by noise and nearer by rounding.
+    costs = [(10.0, 5, 1e-9), (9.9, 24, 1e-16), (10.5, 6, 0.0)]
     assert unbeaten(costs, "numpy") == unbeaten(costs, "shader") == [0]
 
 

@@ -20,9 +20,9 @@ from mdfconv.fitting.problem import ConversionTask
 from mdfconv.fitting.solve import fit
 from mdfconv.timing import NOISE, Advance, Spread, interleave, spread
 
-# Timed angles and rounds: half a second for eight distributions.
-_ANGLES = 4_000_000
-_ROUNDS = 5
+# Timed angles and rounds: a millisecond or a few an evaluation.
+_ANGLES = 1 << 18
+_ROUNDS = 9
 _CONVERSION_ROUNDS = 3
 # A surface is converted once: conversions whose times differ by a smaller factor cost the same.
 _SAME_COST = 10.0
@@ -31,6 +31,8 @@ NOT_CONVERTED = "none"
 # A shader pays for operations, NumPy for the time that its whole arrays take.
 SHADER, NUMPY = "shader", "numpy"
 _COSTS = {SHADER: "for a shader, by operations", NUMPY: "for NumPy, by the time measured now"}
+# Errors that agree in so many decimals are the same: one lobe in several parameters.
+DECIMALS = 6
 
 
 def covering(source: Distribution, target: Distribution, metric: Metric) -> list[Method]:
@@ -140,10 +142,15 @@ class Recommendation:
             vars(candidate)
             | {
                 "within": candidate.max_error <= self.tolerance,
-                "chosen": "both" if len(names) > 1 else "".join(names),
+                "chosen": use_text(names),
             }
             for candidate, names in uses.items()
         ]
+
+
+def use_text(uses: Sequence[str]) -> str:
+    """Return what something is for: ``"shader"``, ``"numpy"``, ``"both"`` or ``""``."""
+    return "both" if len(uses) == len(_COSTS) else "".join(uses)
 
 
 def _uses(chosen: Mapping[str, Candidate]) -> dict[Candidate, list[str]]:
@@ -163,11 +170,11 @@ def recommend(
 ) -> Recommendation:
     """Find the cheapest distribution and conversion whose error stays within a tolerance.
 
-    The cost of a distribution is in a shader the count of its operations, then its error. In
-    NumPy it is its time measured now, in float32: of those as quick as the quickest but for
-    noise, the one with the fewest operations, then the one with the smallest error. The cost of
-    a conversion is the time that it takes for one value: of the methods within a tenfold of the
-    quickest, the one with the smallest error.
+    The cost of a distribution is in a shader the count of its operations, in NumPy its time
+    measured now, in float32. Of those as cheap as the cheapest, times but for noise, it is the one
+    with the smallest error: the first of those that are `unbeaten`. The cost of a conversion is
+    the time that it takes for one value: of the methods within a tenfold of the quickest, the one
+    with the smallest error.
 
     Parameters
     ----------
@@ -210,19 +217,53 @@ def recommend(
 def choose(candidates: Sequence[Candidate], tolerance: float, use: str) -> Candidate:
     """Return the cheapest candidate within a tolerance, for ``"shader"`` or ``"numpy"``."""
     rivals = _within(candidates, tolerance)
-    if use == NUMPY:
-        rivals = _quickest(rivals)
-    return min(rivals, key=lambda one: (one.operations, one.max_error))
+    costs = [(rival.ns, rival.operations, rival.max_error) for rival in rivals]
+    return rivals[unbeaten(costs, use)[0]]
+
+
+def unbeaten(candidates: Sequence[tuple[float, int, float]], use: str) -> list[int]:
+    """Return which candidates nothing beats, by nanoseconds, operations and error of each.
+
+    Those are what nothing is both cheaper and nearer than, the cheapest first: the front of the
+    costs of ``"shader"`` or ``"numpy"`` and the errors. Times that differ by noise are the same,
+    and where errors are the same, too, fewer operations win.
+    """
+    rounded = [(ns, operations, round(error, DECIMALS)) for ns, operations, error in candidates]
+    if use == SHADER:
+        return front([(operations, error) for _, operations, error in rounded])
+    return front([(ns, error, operations) for ns, operations, error in rounded], NOISE)
+
+
+def front(points: Sequence[tuple[float, ...]], tie: float = 0.0) -> list[int]:
+    """Return which points are the Pareto front of a cost and an error, the cost rising.
+
+    Costs count as equal that exceed the least of them by at most the share `tie`. What follows the
+    error in a point decides between equal errors. Of equal points the first is on the front; a
+    point with NaN as the cost or the error never is.
+
+    Examples
+    --------
+    >>> front([(3.0, 0.0), (1.0, 0.2), (2.0, 0.3), (1.0, 0.2)])
+    [1, 0]
+    """
+    indices: list[int] = []
+    lowest: tuple[float, ...] = (np.inf,)
+    least = -np.inf
+    comparable = [index for index, point in enumerate(points) if not np.isnan(point[:2]).any()]
+    for index in sorted(comparable, key=lambda index: points[index]):
+        cost, *error = points[index]
+        if tuple(error) < lowest:
+            lowest = tuple(error)
+            if cost <= (1 + tie) * least:
+                indices[-1] = index
+            else:
+                indices.append(index)
+                least = cost
+    return indices
 
 
 def _within(candidates: Sequence[Candidate], tolerance: float) -> list[Candidate]:
     return [candidate for candidate in candidates if candidate.max_error <= tolerance]
-
-
-def _quickest(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Return those that are as quick as the quickest but for noise."""
-    least = min(candidate.ns for candidate in candidates)
-    return [candidate for candidate in candidates if candidate.ns <= (1 + NOISE) * least]
 
 
 def _timed_fits(
@@ -287,6 +328,10 @@ def _reason(
 
 
 def _tie(candidate: Candidate, within: Sequence[Candidate]) -> str:
-    names = [rival.distribution for rival in _quickest(within)]
-    rivals = [name for name in names if name != candidate.distribution]
+    least = min(rival.ns for rival in within)
+    rivals = [
+        rival.distribution
+        for rival in within
+        if rival.ns <= (1 + NOISE) * least and rival.distribution != candidate.distribution
+    ]
     return f"; {' and '.join(rivals)} as quick, but for noise" if rivals else ""

@@ -6,3 +6,9 @@ The tests run in one process for each processor; more threads would only wait fo
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from hypothesis import settings  # noqa: E402
+
+# No test asserts a time.
+settings.register_profile("mdfconv", deadline=None)
+settings.load_profile("mdfconv")

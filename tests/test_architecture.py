@@ -39,7 +39,7 @@ ABOUT_PARTICULAR_ONES = {
     "scene/mitsuba/scene.py": "Mitsuba's distributions",
     "cli/mitsuba_command.py": "the target by default, of those that Mitsuba has",
     "scene/shininess.py": "the definition of Wavefront's Ns and Pr",
-    "studies/bench.py": "the paper's sweep, and the kernel that is written in Dr.Jit",
+    "studies/bench.py": "the paper's sweep",
     "cli/bench_command.py": "the pair that is measured by default",
     "cli/plot_error_command.py": "the paper's reference",
     "cli/fit_table_command.py": "the paper's reference",

@@ -30,7 +30,7 @@ _SOURCE = option(
     "MDF", "Source of the timed conversions.", "--from", words=completion.distributions
 )
 _TARGET = option("MDF", "Target of the timed conversions.", "--to", words=completion.distributions)
-_QUICK = flag("--quick", "Less than a minute in place of some: fewer values, rounds.")
+_QUICK = flag("--quick", "Some ten seconds in place of a minute: fewer values, rounds.")
 
 
 def command(
@@ -47,10 +47,10 @@ def command(
 ) -> None:
     """Measure speed against error on this machine.
 
-    Distributions in the place of another one, conversion methods, and kernels against their
-    textbook expressions: medians of interleaved repeats with quartiles. If Dr.Jit is installed, a
-    kernel that it compiles is timed as well. CSV has the tables one below another, told apart by
-    the column "table"; markdown is a page that says what they mean.
+    Distributions in the place of another one, conversion methods beside loops of SciPy's curve_fit,
+    and kernels beside their textbook expressions, a copy of the angles and, if it is installed,
+    Dr.Jit: medians of interleaved repeats with quartiles. CSV has the tables one below another,
+    told apart by the column "table"; markdown is a page that says what they mean.
 
     Examples:
 

@@ -37,9 +37,9 @@ def command(
     """Recommend the cheapest distribution and conversion for a surface.
 
     Leaves out distributions whose best fit exceeds the tolerance. For a shader the cheapest has the
-    fewest operations; for NumPy it is the quickest on this machine, timed now in about a second, of
-    several within 10 % the one with the fewest operations. Each with the cheapest conversion that
-    stays within the tolerance.
+    fewest operations; for NumPy it is the quickest on this machine, timed now, of several within
+    10 % the one with the smallest error. Each with the cheapest conversion that stays within the
+    tolerance.
 
     Examples:
 

@@ -12,7 +12,7 @@ from mdfconv.distributions import elementary
 from mdfconv.distributions.evaluation import Array, Indices, Mask
 
 # (1 + tan²β)² stays finite.
-_LARGEST_SQUARE = {np.dtype(np.float32): 1e18, np.dtype(np.float64): 1e150}
+_LARGEST_SQUARE: Mapping[Any, float] = {np.dtype(np.float32): 1e18, np.dtype(np.float64): 1e150}
 # Up to here cos β is more than ¼.
 _FAR_SQUARE = 1.7
 _HORIZON_SQUARE = {dtype: np.square(dtype.type(0.5 * np.pi)) for dtype in _LARGEST_SQUARE}

@@ -27,7 +27,7 @@ Kernel: TypeAlias = Callable[..., Any]
 # Large enough to hide the cost of a call, small enough for the intermediates to stay in cache; no
 # power of 2, which would put the same elements of all arrays into the same lines of the cache.
 _BLOCK = 100_000
-# Bytes that the allocator keeps, at most.
+# Bytes, the most for which the GNU C library keeps what is freed.
 _KEPT = 31 << 20
 # Smaller arrays are done sooner than threads are started; a few parts for each thread even out
 # what the others are kept from.
@@ -114,7 +114,7 @@ def evaluate(kernel: Kernel, angles: ArrayLike, *operands: ArrayLike, threads: i
             buffersize=_BLOCK,
         )
     if size > _BLOCK:
-        _keep_memory()
+        keep_memory()
     with iterator:
         in_parts(partial(_run, kernel, iterator), size, threads)
         result: Any = iterator.operands[-1]
@@ -126,11 +126,11 @@ def evaluate(kernel: Kernel, angles: ArrayLike, *operands: ArrayLike, threads: i
 
 
 @cache
-def _keep_memory() -> None:
+def keep_memory() -> None:
     """Let the allocator keep the memory of freed blocks.
 
     The GNU C library returns large blocks to the system, and fresh pages cost more than what is
-    computed in them. Once a block of some size has been freed, it keeps what is smaller.
+    computed in them. Once a block of some size has been freed, it keeps twice as much.
     """
     np.empty(_KEPT, np.uint8)
 

@@ -8,7 +8,6 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -26,16 +25,17 @@ from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.fitting.problem import bounded_tangent
 from mdfconv.fitting.quadrature import LobeQuadrature
 from mdfconv.recommend import answers, best, covering, evaluation_times
+from mdfconv.studies.compiled import drjit_evaluation
 from mdfconv.studies.stability import printed_form
 from mdfconv.studies.table2 import paper_sweep
 from mdfconv.timing import Advance, Spread, interleave, spread
 
 PRECISIONS = ("float64", "float32")
-# Beside the methods: a loop of scipy.optimize.curve_fit.
-LOOP = "curve_fit"
+# Beside the methods: loops of scipy.optimize.curve_fit, on what `fit` compares, and on samples of
+# the printed unit forms on a part of the hemisphere, as one would write it without the package.
+LOOP, PLAIN_LOOP = "curve_fit", "curve_fit, 200 samples"
+_PLAIN_SAMPLES, _PLAIN_END = 200, 0.8
 Row = dict[str, Any]
-# What is written in Dr.Jit.
-_COMPILED = "ggx"
 # The paper's sweep is one of this distribution's m_B.
 _PAPER_SOURCE = "beckmann"
 
@@ -53,7 +53,7 @@ class Sizes:
     fits : int
         Values of a conversion by ``"fit"``, and of the comparison of results.
     loop : int
-        Values of a loop of scipy.optimize.curve_fit.
+        Values of each loop of scipy.optimize.curve_fit.
     rounds : int
         Repeats that are counted.
     """
@@ -65,8 +65,9 @@ class Sizes:
     rounds: int
 
 
-FULL = Sizes(angles=4_000_000, conversions=100_000, fits=256, loop=17, rounds=11)
-QUICK = Sizes(angles=2_000_000, conversions=100_000, fits=32, loop=5, rounds=5)
+# The results of so few angles stay on the heap.
+FULL = Sizes(angles=1 << 20, conversions=100_000, fits=512, loop=17, rounds=21)
+QUICK = Sizes(angles=1 << 19, conversions=100_000, fits=128, loop=5, rounds=5)
 
 
 @dataclass(frozen=True)
@@ -192,58 +193,36 @@ def substitutes(task: Task, advance: Advance) -> list[Row]:
 
 
 def kernel_speeds(task: Task, advance: Advance) -> list[Row]:
-    """Measure the unit forms of the candidates in both precisions, and the printed expressions.
+    """Measure the unit forms of the candidates in both precisions, and what they can be held to.
 
-    Times are nanoseconds of an evaluation; `speedup` is textbook/kernel, the median of the ratios
-    within a round. GGX has ``drjit_ns``, too, where Dr.Jit is installed: the form as its LLVM
-    backend compiles it, in one thread.
+    Times are nanoseconds of an evaluation: of the kernel, of the printed expression as Dr.Jit
+    compiles it (`drjit_evaluation`, where there is one) and in NumPy, and of copying the angles,
+    which is what memory allows. Ratios are the kernel's times over the others', medians of those
+    within a round.
     """
     rows = []
     for precision in PRECISIONS:
         beta = np.linspace(0, np.pi / 2, task.sizes.angles, dtype=precision)
         for candidate in task.candidates:
             parameter = candidate.parameter.typical_value
-            rounded = beta.dtype.type(parameter)
-            functions: dict[str, Callable[[], object]] = {
-                "kernel_ns": partial(candidate.unit, beta, parameter),
-                "textbook_ns": partial(printed_form, candidate, "unit", beta, rounded),
+            functions: dict[str, Callable[[], object] | None] = {
+                "kernel": partial(candidate.unit, beta, parameter),
+                "drjit": drjit_evaluation(candidate, beta, parameter),
+                "textbook": partial(
+                    printed_form, candidate, "unit", beta, beta.dtype.type(parameter)
+                ),
+                "copy": beta.copy,
             }
-            if candidate.name == _COMPILED and _drjit():
-                functions["drjit_ns"] = compiled_ggx(beta, parameter)
-            samples = interleave(functions, task.sizes.rounds, advance)
+            measured = {name: each for name, each in functions.items() if each}
+            samples = interleave(measured, task.sizes.rounds, advance)
             row = {"distribution": candidate.name, "precision": precision, "parameter": parameter}
-            times = {name: spread(1e9 * each / beta.size) for name, each in samples.items()}
-            speedup = float(np.median(samples["textbook_ns"] / samples["kernel_ns"]))
-            compiled = times.pop("drjit_ns", None)
-            row |= {**times, "speedup": speedup}
-            rows.append(row | {"drjit_ns": compiled} if compiled else row)
+            for name, seconds in samples.items():
+                row[f"{name}_ns"] = spread(1e9 * seconds / beta.size)
+            kernel = samples.pop("kernel")
+            for name, seconds in samples.items():
+                row[f"per_{name}"] = float(np.median(kernel / seconds))
+            rows.append(row)
     return rows
-
-
-def compiled_ggx(beta: Array, alpha: float) -> Callable[[], Any]:
-    """Return what evaluates GGX's unit form in Dr.Jit, which is installed, in one thread."""
-    drjit = _drjit()
-    drjit.set_thread_count(1)
-    kind = drjit.llvm.Float64 if beta.dtype == np.float64 else drjit.llvm.Float
-    angles, slope = kind(beta), 1 / alpha**2 - 1
-
-    def evaluate() -> Any:
-        value = drjit.square(drjit.rcp(drjit.fma(drjit.square(drjit.sin(angles)), slope, 1)))
-        drjit.eval(value)
-        drjit.sync_thread()
-        return value
-
-    return evaluate
-
-
-def _drjit() -> Any:
-    """Return the module; None where it is not installed or finds no LLVM."""
-    try:
-        drjit = import_module("drjit")
-        import_module("drjit.llvm")
-    except ImportError:
-        return None
-    return drjit if drjit.has_backend(drjit.JitBackend.LLVM) else None
 
 
 def as_wide(m_b: ArrayLike, source: Distribution) -> Array:
@@ -265,10 +244,12 @@ def sweep(source: Distribution, count: int) -> Array:
 def method_speeds(task: Task, advance: Advance) -> list[Row]:
     """Measure every method that covers the pair, under every metric it can answer.
 
-    A method that follows no metric is measured once, under the first one. `values` are converted
-    at a time, `per_second` is how many a second. The errors are the median and the maximum, over
-    the share of the sweep that is `answered` within the legal range: of |p/p_fit − 1|, p_fit the
-    result of ``"fit"``, and of the RMSE of `remaining_error`.
+    What follows no metric is measured once, under the first one, that of the unit forms. `values`
+    are converted at a time, `per_second` is how many a second; `over_loop` and `over_plain_loop`
+    are how many times as many as by a loop of curve_fit, by `curve_fit_loop` under the same metric
+    and by `plain_loop`. The errors are the median and the maximum, over the share of the sweep that
+    is `answered` within the legal range: of |p/p_fit − 1|, p_fit the result of ``"fit"``, and of
+    the RMSE of `remaining_error`.
 
     Raises
     ------
@@ -285,15 +266,17 @@ def method_speeds(task: Task, advance: Advance) -> list[Row]:
         for method in covering(source, target, metric)
         if method.follows_metric or metric is metrics[0]
     ]
-    methods += [(LOOP, metric, curve_fit_loop) for metric in metrics]
+    plain = PLAIN_LOOP, metrics[0]
+    methods += [(LOOP, metric, curve_fit_loop) for metric in metrics] + [(*plain, plain_loop)]
     # Among more values most fits come from a curve: here each is found by itself.
-    counts = {LOOP: sizes.loop, "fit": sizes.fits}
+    counts = {LOOP: sizes.loop, PLAIN_LOOP: sizes.loop, "fit": sizes.fits}
     values = [counts.get(name, sizes.conversions) for name, _, _ in methods]
     conversions = {
         (name, metric): partial(convert, sweep(source, count), source, target, metric)
         for (name, metric, convert), count in zip(methods, values, strict=True)
     }
     times = interleave(conversions, sizes.rounds, advance)
+    speeds = {key: count / times[key] for key, count in zip(conversions, values, strict=True)}
     rows = []
     for (name, metric, convert), count in zip(methods, values, strict=True):
         parameter = sweep(source, min(count, sizes.fits))
@@ -306,7 +289,10 @@ def method_speeds(task: Task, advance: Advance) -> list[Row]:
         if not answered.any():
             off = rmse = np.array([np.nan])
         row: Row = {"from": source.name, "to": target.name, "method": name, "metric": str(metric)}
-        row |= {"values": count, "per_second": spread(count / times[name, metric])}
+        speed = speeds[name, metric]
+        row |= {"values": count, "per_second": spread(speed)}
+        row["over_loop"] = float(np.median(speed / speeds[LOOP, metric]))
+        row["over_plain_loop"] = float(np.median(speed / speeds[plain]))
         for column, errors in (("parameter_error", off), ("rmse", rmse)):
             row |= {column: float(np.median(errors)), f"{column}_max": float(np.max(errors))}
         rows.append(row | {"answered": float(np.mean(answered))})
@@ -318,32 +304,67 @@ def curve_fit_loop(
 ) -> Array:
     """Fit values one by one from equal half angles, on the samples that the package fits to.
 
-    It is what one would write without the package. Results are NaN where there is no start or
-    no convergence.
+    Results are NaN where there is no start or no convergence.
     """
-    from scipy.optimize import OptimizeWarning, curve_fit
-
     angles, weight = LobeQuadrature(np.arctan(bounded_tangent(source, parameter))).nodes(
         np.arange(parameter.size)
     )
     column = parameter[:, None]
     peak = source.maximum(column, normalized=metric.normalized)
-    reference = metric.signal(source, angles, column, peak)
+    with np.errstate(all="ignore"):
+        reference = metric.signal(source, angles, column, peak)
+        sigma = 1 / np.sqrt(weight * metric.weight(angles))
+
+    def problem(row: int, start: float) -> tuple[Any, ...]:
+        def signal(beta: Array, log_parameter: float) -> Array:
+            return metric.signal(target, Angles(beta), np.exp([log_parameter]), peak[row])
+
+        return signal, angles.beta[row], reference[row], [np.log(start)], sigma[row]
+
+    return np.exp(_one_by_one(parameter, source, target, problem))
+
+
+def plain_loop(
+    parameter: Array, source: Distribution, target: Distribution, metric: Metric
+) -> Array:
+    """Fit values one by one as one would without the package, whatever the metric.
+
+    The printed unit forms are compared at 200 angles from 0 to 0.8, from equal half angles.
+    Results are NaN where there is no start, no convergence, or none in the legal range.
+    """
+    beta = np.linspace(0, _PLAIN_END, _PLAIN_SAMPLES)
+
+    def form(mdf: Distribution) -> Callable[[Array, float], Array]:
+        gamma = [mdf.gamma] if mdf.second_parameter else []
+        return lambda beta, value: mdf.printed.unit(beta, value, *gamma)
+
+    shape, reference = form(target), form(source)
+
+    def problem(row: int, start: float) -> tuple[Any, ...]:
+        return shape, beta, reference(beta, parameter[row]), [start]
+
+    result = _one_by_one(parameter, source, target, problem)
+    return np.where(target.parameter.accepts(result), result, np.nan)
+
+
+def _one_by_one(
+    parameter: Array,
+    source: Distribution,
+    target: Distribution,
+    problem: Callable[[int, float], tuple[Any, ...]],
+) -> Array:
+    """Call curve_fit with the arguments for each row and its start, the equal half angle."""
+    from scipy.optimize import OptimizeWarning, curve_fit
+
     starts = target.from_half_tangent(source.half_tangent(parameter))
     results = np.full(parameter.size, np.nan)
     with np.errstate(all="ignore"), warnings.catch_warnings():
-        sigma = 1 / np.sqrt(weight * metric.weight(angles))
         # A perfect fit has no covariance to speak of.
         warnings.simplefilter("ignore", OptimizeWarning)
         for row in np.flatnonzero(~np.isnan(starts)).tolist():
-
-            def signal(beta: Array, log_parameter: float, row: int = row) -> Array:
-                return metric.signal(target, Angles(beta), np.exp([log_parameter]), peak[row])
-
-            start = [np.log(starts[row])]
             try:
-                fitted, _ = curve_fit(signal, angles.beta[row], reference[row], start, sigma[row])
+                fitted, _ = curve_fit(*problem(row, starts[row]))
             except RuntimeError:
                 continue
-            results[row] = np.exp(fitted[0])
+            results[row] = fitted[0]
     return results

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from itertools import cycle, groupby
+from collections.abc import Callable, Iterator, Sequence
+from itertools import cycle, groupby, product
 from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from mdfconv.distributions.evaluation import Array
 from mdfconv.output.figures import encoded, line_style, new_figure
 from mdfconv.output.records import markdown_text
-from mdfconv.studies.bench import LOOP, PRECISIONS, Measurements, Row
+from mdfconv.recommend import DECIMALS, NUMPY, SHADER, front, unbeaten, use_text
+from mdfconv.studies.bench import LOOP, PLAIN_LOOP, PRECISIONS, Measurements, Row
 from mdfconv.studies.pages import fill
 from mdfconv.timing import NOISE, Spread
 
@@ -20,12 +22,18 @@ TITLES = {
     "methods": "Conversion methods",
     "kernels": "Kernels",
 }
+# What kernels are held to, as the columns of their table name it.
+_RIVALS = {"drjit": "Dr.Jit", "textbook": "textbook", "copy": "copy"}
+# What the picture shows, in it and on the page.
+CAPTION = (
+    "Cost against error, both better when smaller: a line joins what nothing is both cheaper and "
+    "nearer than, and recommend takes the leftmost distribution on it within the tolerance."
+)
 
 
 def tables(measurements: Measurements) -> dict[str, list[Row]]:
     """Return the tables by name, in rounded cells, a median with its quartiles in one."""
     measured = measurements.tables
-    by_reference = itemgetter("reference", "reference_parameter")
     substitutes = [
         {
             "reference": f"{row['reference']} {row['reference_parameter']:g}",
@@ -37,10 +45,10 @@ def tables(measurements: Measurements) -> dict[str, list[Row]]:
             "RMSE": _rounded(row["rmse"]),
             "max error": _rounded(row["max_error"]),
             "energy error": _rounded(row["energy_error"]),
-            "unbeaten": unbeaten,
+            "unbeaten": use_text([use for use in (SHADER, NUMPY) if number in fronts[use]]),
         }
-        for _, group in groupby(measured["substitutes"], by_reference)
-        for row, unbeaten in _judged(list(group))
+        for group, fronts in _judged(measurements)
+        for number, row in enumerate(group)
     ]
     methods = [
         {
@@ -48,7 +56,8 @@ def tables(measurements: Measurements) -> dict[str, list[Row]]:
             "metric": row["metric"],
             "values": row["values"],
             "ns a value": _times(_nanoseconds(row)),
-            "values per second": f"{_rounded(row['per_second'].median):,.0f}",
+            f"× {LOOP}": _rounded(row["over_loop"]),
+            f"× {PLAIN_LOOP}": _rounded(row["over_plain_loop"]),
             "parameter error": _rounded(row["parameter_error"]),
             "largest": _rounded(row["parameter_error_max"]),
             "RMSE": _rounded(row["rmse"]),
@@ -57,18 +66,36 @@ def tables(measurements: Measurements) -> dict[str, list[Row]]:
         }
         for row in measured["methods"]
     ]
+    rivals = {key: name for key, name in _RIVALS.items() if _timed(measured["kernels"], key)}
     kernels = [
         {
             "distribution": row["distribution"],
             "type": row["precision"],
             "kernel ns": _times(row["kernel_ns"]),
-            "textbook ns": _times(row["textbook_ns"]),
-            "textbook / kernel": _rounded(row["speedup"]),
-            "Dr.Jit ns": _times(row["drjit_ns"]) if "drjit_ns" in row else "",
+            **{f"kernel / {rivals[key]}": _cell(row, f"per_{key}", _rounded) for key in rivals},
+            **{f"{rivals[key]} ns": _cell(row, f"{key}_ns", _times) for key in rivals},
         }
         for row in measured["kernels"]
     ]
     return {"substitutes": substitutes, "methods": methods, "kernels": kernels}
+
+
+def _judged(measurements: Measurements) -> Iterator[tuple[list[Row], dict[str, list[int]]]]:
+    """Yield the substitutes of each reference, and which of them are unbeaten for each use."""
+    by_reference = itemgetter("reference", "reference_parameter")
+    for _, group in groupby(measurements.tables["substitutes"], by_reference):
+        rows = list(group)
+        costs = [(row["ns_float32"].median, row["operations"], row["max_error"]) for row in rows]
+        yield rows, {use: unbeaten(costs, use) for use in (SHADER, NUMPY)}
+
+
+def _timed(kernels: Sequence[Row], rival: str) -> list[Row]:
+    """Return the kernels that were timed against a rival."""
+    return [row for row in kernels if f"per_{rival}" in row]
+
+
+def _cell(row: Row, column: str, form: Callable[[Any], Any]) -> Any:
+    return form(row[column]) if column in row else ""
 
 
 def title(measurements: Measurements, name: str) -> str:
@@ -82,66 +109,47 @@ def _pair(measurements: Measurements) -> str:
 
 def markdown_page(measurements: Measurements, picture: str | None = None) -> str:
     """Return the measurements as a Markdown page, which shows a picture if one is named."""
-    methods = measurements.tables["methods"]
-    speeds = {(row["method"], row["metric"]): row["per_second"].median for row in methods}
-    gains = [
-        speed / speeds[LOOP, metric]
-        for (method, metric), speed in speeds.items()
-        if method == "fit"
-    ]
-    formulas = [row for row in methods if row["method"] not in ("fit", LOOP)]
+    methods, kernels = measurements.tables["methods"], measurements.tables["kernels"]
+    fits = [row for row in methods if row["method"] == "fit"]
+    loops = [row for row in methods if row["method"] == LOOP]
+    (plain,) = [row for row in methods if row["method"] == PLAIN_LOOP]
+    formulas = [row for row in methods if row["method"] not in ("fit", LOOP, PLAIN_LOOP)]
     quickest = max(formulas, key=lambda row: row["per_second"].median)
-    kernels = measurements.tables["kernels"]
-    shares = {
-        precision: [1 / row["speedup"] for row in kernels if row["precision"] == precision]
-        for precision in PRECISIONS
-    }
-    shown = f"![Error against time, distributions and methods]({picture})\n\n" if picture else ""
+    compiled = ""
+    if _timed(kernels, "drjit"):
+        compiled = (
+            f"\n  They take {_share(kernels, 'drjit', 'float32')} as long in float32 and "
+            f"{_share(kernels, 'drjit', 'float64')} in float64 as Dr.Jit does,\n"
+            "  which compiles those expressions."
+        )
+    shown = f"![Error against cost, distributions and methods]({picture})" if picture else ""
     return fill(
         "speed-error",
-        least_gain=min(gains),
-        most_gain=max(gains),
-        loop_error=max(row["parameter_error_max"] for row in methods if row["method"] == LOOP),
+        gain=_range([row["over_loop"] for row in fits]),
+        plain_gain=_range([row["over_plain_loop"] for row in fits]),
+        loop_error=max(row["parameter_error_max"] for row in loops),
+        plain_error=plain["parameter_error_max"],
         quickest=quickest,
         per_second=_rounded(quickest["per_second"].median, 2),
-        least_share={name: min(values) for name, values in shares.items()},
-        most_share={name: max(values) for name, values in shares.items()},
+        share={one: _share(kernels, "textbook", one) for one in PRECISIONS},
+        compiled=compiled,
+        noise=NOISE,
         machine=measurements.machine,
         sizes=vars(measurements.sizes),
-        picture=shown,
+        picture=f"{shown}\n\n{CAPTION}\n\n" if picture else "",
         pair=_pair(measurements),
         **{name: markdown_text(list(rows[0]), rows) for name, rows in tables(measurements).items()},
     )
 
 
-def _judged(rows: Sequence[Row]) -> list[tuple[Row, bool]]:
-    """Return substitutes with whether none is both quicker, beyond noise, and nearer."""
-    unbeaten = front([(row["ns_float32"].median, row["rmse"]) for row in rows], NOISE)
-    return [(row, number in unbeaten) for number, row in enumerate(rows)]
+def _share(kernels: Sequence[Row], rival: str, precision: str) -> str:
+    """Return how many times as long as a rival the kernels of a precision take."""
+    rows = [row for row in _timed(kernels, rival) if row["precision"] == precision]
+    return f"{_range([row[f'per_{rival}'] for row in rows])} times"
 
 
-def front(points: Sequence[tuple[float, float]], tie: float = 0.0) -> list[int]:
-    """Return which points are the Pareto front of two costs, the first cost rising.
-
-    First costs count as equal if one exceeds the other by at most the share `tie`. Of equal
-    points the first is on the front; a point with NaN never is.
-
-    Examples
-    --------
-    >>> front([(3.0, 0.0), (1.0, 0.2), (2.0, 0.3), (1.0, 0.2)])
-    [1, 0]
-    """
-    indices: list[int] = []
-    lowest = float("inf")
-    comparable = [index for index, point in enumerate(points) if not np.isnan(point[0])]
-    for index in sorted(comparable, key=lambda index: points[index]):
-        cost, error = points[index]
-        if error < lowest:
-            lowest = error
-            while indices and cost <= (1 + tie) * points[indices[-1]][0]:
-                indices.pop()
-            indices.append(index)
-    return indices
+def _range(values: Sequence[float]) -> str:
+    return f"{min(values):.2g} to {max(values):.2g}"
 
 
 def _rounded(value: float, digits: int = 3) -> float:
@@ -159,81 +167,205 @@ def _nanoseconds(row: Row) -> Spread:
     return Spread(median, high, low)
 
 
-_SIZE = (11.0, 6.5)  # inches
-_MARKERS = "osD^vPX*<>hp"
-# Tell apart variants of one name: parameters of the reference, metrics of a method.
-_FILLS = ("full", "none", "left", "top", "right", "bottom")
-_FRONTS = ("-", "--", ":", "-.")
-_COLORS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_WIDTH, _HEIGHT, _LEAST_HEIGHT = 14.0, 3.6, 4.8  # inches; the second is that of a reference
+_DPI = 120
+# Metrics are told apart by colour, marker and line, distributions by their colours and labels.
+_METRIC_STYLES = (
+    ("#0072B2", "o", "-"), ("#D55E00", "s", "--"), ("#009E73", "^", ":"), ("#CC79A7", "D", "-."),
+    ("#000000", "v", (0, (6, 2, 1, 2))), ("#E69F00", "P", (0, (1, 3))),
+)  # fmt: skip
 _ROUNDING = 1e-12  # smaller errors are none
+# Of labels and markers, in points: their sizes, how far labels are apart at least, and how far from
+# its point one may be.
+_LABEL_SIZE, _MARKER_SIZE, _APART = 8, 5, 2
+_DISTANCES = (0, 4, 9, 15, 22, 30, 40, 52, 66, 82, 100, 120)
+# To the right first, then more and more away from it, up before down.
+_DIRECTIONS = [
+    np.array([np.cos(angle), side * np.sin(angle)])
+    for angle in np.linspace(0, np.pi, 13)
+    for side in (1, -1)
+]
 
 
 class _Point(NamedTuple):
-    name: str
-    variant: str
-    nanoseconds: Spread
+    label: str
+    cost: Spread
     error: float
+    color: str
+    marker: str
 
 
-def draw(measurements: Measurements, dpi: int = 120) -> bytes:
-    """Return a PNG of error against time, of distributions and of methods.
+def draw(measurements: Measurements) -> bytes:
+    """Return a PNG of error against cost, of distributions and of methods.
 
     Low and left is better. What has no error to show is left out.
     """
-    figure = new_figure(*_SIZE)
-    # Not before `new_figure` has prepared Matplotlib.
+    return encoded(figure_of(measurements), dpi=_DPI)
+
+
+def figure_of(measurements: Measurements) -> Any:
+    """Return the figure: a row of panels for each reference, and one for the methods."""
+    judged = list(_judged(measurements))
+    figure = new_figure(_WIDTH, max(_LEAST_HEIGHT, _HEIGHT * len(judged)))
+    figure.set_dpi(_DPI)
+    figure.suptitle(CAPTION)
+    grid = figure.add_gridspec(len(judged), 3, width_ratios=(1, 1, 1.2))
+    panels = {}
+    for (number, (rows, fronts)), use in product(enumerate(judged), (SHADER, NUMPY)):
+        axes = figure.add_subplot(grid[number, use == NUMPY])
+        panels[axes] = _draw_substitutes(axes, rows, use, fronts[use])
+    axes = figure.add_subplot(grid[:, 2])
+    panels[axes] = _draw_methods(axes, measurements.tables["methods"])
+    axes.set_title(title(measurements, "methods"))
+    for axes, points in panels.items():
+        for point in points:
+            median, low, high = point.cost
+            quartiles = {"xerr": [[median - low], [high - median]], "elinewidth": 0.8}
+            style = {"fmt": point.marker, "color": point.color, "markersize": _MARKER_SIZE}
+            axes.errorbar(median, point.error, **style, **quartiles)
+        _scale(axes, points)
+    # Where there is room is known once everything else has its place, which it keeps.
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axes, points in panels.items():
+        _label(axes, points)
+    return figure
+
+
+def _draw_substitutes(
+    axes: Any, rows: Sequence[Row], use: str, unbeaten_rows: Sequence[int]
+) -> list[_Point]:
+    """Draw the distributions in the place of one reference, by their cost for a use."""
+    points = []
+    for row in rows:
+        name, color = row["distribution"], line_style(row["distribution"])["color"]
+        error = round(row["max_error"], DECIMALS)
+        points.append(_Point(name, _cost(row, use), error, color, "o"))
+    _join(axes, [points[number] for number in unbeaten_rows], "0.6", "-")
+    whose, programs = "{reference} {reference_parameter:.4g}".format_map(rows[0]), _PROGRAMS[use]
+    axes.set(title=f"In the place of {whose}, for {programs[0]}", xlabel=programs[1])
+    axes.set_ylabel("maximum error of the best fit, unit form")
+    return points
+
+
+_PROGRAMS = {
+    SHADER: ("a shader", "operations of an evaluation"),
+    NUMPY: ("NumPy", "time of an evaluation, float32 [ns]"),
+}
+
+
+def _cost(row: Row, use: str) -> Spread:
+    cost: Spread = row["ns_float32"]
+    return cost if use == NUMPY else Spread(*[float(row["operations"])] * 3)
+
+
+def _draw_methods(axes: Any, rows: Sequence[Row]) -> list[_Point]:
+    """Draw the methods and the loops beside them by the time of a value, a colour a metric."""
+    drawn = []
+    metrics = dict.fromkeys(row["metric"] for row in rows)
+    for metric, (color, marker, line) in zip(metrics, cycle(_METRIC_STYLES)):
+        points = [
+            _Point(row["method"], _nanoseconds(row), row["parameter_error"], color, marker)
+            for row in rows
+            if row["metric"] == metric
+        ]
+        costs = [(point.cost.median, point.error) for point in points]
+        _join(axes, [points[index] for index in front(costs, NOISE)], color, line, marker, metric)
+        drawn += points
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=4, title="metric")
+    axes.set(xlabel="time of a value [ns]", ylabel="median error of the parameter against fit")
+    return drawn
+
+
+def _join(
+    axes: Any, points: Sequence[_Point], color: str, line: Any, marker: str = "", label: str = ""
+) -> None:
+    """Join the points of a front, right and then down."""
+    costs = [point.cost.median for point in points for _ in range(2)][1:]
+    errors = [point.error for point in points for _ in range(2)][:-1]
+    style = {"color": color, "linestyle": line, "linewidth": 1.0, "zorder": 1.5}
+    marks = {"marker": marker, "markevery": 2, "markersize": _MARKER_SIZE}
+    axes.plot(costs, errors, label=label, **style, **marks)
+
+
+def _scale(axes: Any, points: Sequence[_Point]) -> None:
+    """Scale both axes by logarithms, except errors below the smallest, so that 0 is shown."""
     from matplotlib.ticker import LogLocator
 
-    left, right = figure.subplots(1, 2)
-    variant = "for {reference} {reference_parameter:.4g}".format_map
-    substitutes = [
-        _Point(row["distribution"], variant(row), row["ns_float32"], row["rmse"])
-        for row in measurements.tables["substitutes"]
-    ]
-    methods = [
-        _Point(row["method"], f"metric {row['metric']}", _nanoseconds(row), row["parameter_error"])
-        for row in measurements.tables["methods"]
-    ]
-    names = dict.fromkeys(point.name for point in methods)
-    _draw_panel(left, substitutes, {p.name: line_style(p.name)["color"] for p in substitutes})
-    _draw_panel(right, methods, dict(zip(names, cycle(_COLORS), strict=False)))
-    left.set(title=TITLES["substitutes"], xlabel="time of an evaluation, float32 [ns]")
-    left.set_ylabel("RMSE of the best fit, unit form")
-    # So few powers of ten that one cannot read between them.
-    left.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    left.xaxis.set_major_formatter("{x:g}")
-    left.xaxis.set_minor_formatter("")
-    right.set(title=title(measurements, "methods"), xlabel="time of a conversion [ns]")
-    right.set_ylabel("median relative error of the parameter against fit")
-    return encoded(figure, dpi=dpi)
-
-
-def _draw_panel(axes: Any, points: Iterable[_Point], colors: dict[str, str]) -> None:
-    """Draw points with their quartiles, the Pareto front of each variant, and a legend."""
-    points = [point for point in points if np.isfinite(point.error)]
-    shapes = dict(zip(colors, cycle(_MARKERS), strict=False))
-    variants = dict.fromkeys(point.variant for point in points)
-    named: set[str] = set()
-    for variant, filling, line in zip(variants, cycle(_FILLS), cycle(_FRONTS), strict=False):
-        own = [point for point in points if point.variant == variant]
-        style = {"fillstyle": filling, "markerfacecoloralt": "white"}
-        costs = [(point.nanoseconds.median, point.error) for point in own]
-        corners = zip(*(costs[index] for index in front(costs, NOISE)), strict=True)
-        axes.step(
-            *corners, where="post", marker="o", color="0.55", linestyle=line, label=variant, **style
-        )
-        for point in own:
-            median, low, high = point.nanoseconds
-            quartiles = {"xerr": [[median - low], [high - median]], "elinewidth": 0.8}
-            label = None if point.name in named else point.name
-            marked = style | {"marker": shapes[point.name], "color": colors[point.name]}
-            axes.errorbar(median, point.error, label=label, linestyle="", **quartiles, **marked)
-            named.add(point.name)
-    caption = "lines: what nothing is both quicker and nearer than"
-    below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13), "ncols": 3}
-    axes.legend(title=caption, fontsize=8, title_fontsize=8, **below)
-    # Linear below the smallest error, so that an error of 0 is shown.
     smallest = min((point.error for point in points if point.error > _ROUNDING), default=1.0)
-    axes.set_yscale("symlog", linthresh=smallest)
-    axes.set_ylim(bottom=-0.2 * smallest)
     axes.set_xscale("log")
+    axes.set_yscale("symlog", linthresh=smallest)
+    axes.margins(x=0.15, y=0.15)
+    axes.set_ylim(bottom=-0.4 * smallest)
+    low, high = axes.get_xlim()
+    if high < 1000 * low:
+        # So few powers of ten that one cannot read between them.
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter("")
+
+
+def _label(axes: Any, points: Sequence[_Point]) -> None:
+    """Write the label of each point as near to it as there is room, and lead from one to the other.
+
+    Labels cover neither each other nor markers, quartiles, lines and leaders.
+    """
+    from matplotlib.text import Text
+
+    shown = [point for point in points if np.isfinite(point.error)]
+    places = np.reshape([(point.cost.median, point.error) for point in shown], (-1, 2))
+    room = _Room(axes, axes.transData.transform(places))
+    for number, point in enumerate(shown):
+        text = axes.annotate(
+            point.label, (point.cost.median, point.error), (0, 0), textcoords="offset points",
+            ha="center", va="center", fontsize=_LABEL_SIZE, color=point.color, in_layout=False,
+            arrowprops={"arrowstyle": "-", "color": "0.5", "linewidth": 0.5, "shrinkB": 0},
+        )  # fmt: skip
+        offset, distance = room.take(number, np.array(Text.get_window_extent(text).size))
+        text.set_position(offset)
+        text.arrow_patch.set_visible(distance > 0)
+
+
+class _Room:
+    """What is drawn in axes, in pixels: points at their centers, their quartiles, and lines."""
+
+    def __init__(self, axes: Any, centers: Array) -> None:
+        from matplotlib.transforms import Bbox
+
+        self.inside, self.centers = axes.bbox, centers
+        self.point_size = axes.figure.dpi / 72
+        self.reach = (_MARKER_SIZE / 2 + 1) * self.point_size
+        self.markers = [Bbox([center - self.reach, center + self.reach]) for center in centers]
+        quartiles = [path for bars in axes.collections for path in bars.get_paths()]
+        drawn = [*quartiles, *(line.get_path() for line in axes.lines)]
+        self.lines = [axes.transData.transform_path(path) for path in drawn]
+        self.labels: list[Any] = []
+
+    def take(self, number: int, size: Array) -> tuple[Array, int]:
+        """Take room for the label of a point; return its offset and its distance, in points."""
+        from matplotlib.path import Path
+        from matplotlib.transforms import Bbox
+
+        center, half = self.centers[number], (size + _APART * self.point_size) / 2
+        fewest: float = np.inf
+        for distance, direction in product(_DISTANCES, _DIRECTIONS):
+            place = center + direction * (half + self.reach + distance * self.point_size)
+            box, leader = Bbox([place - half, place + half]), Path([center, place])
+            found = self._covered(number, box, leader)
+            if found < fewest:
+                fewest, best = found, (place, distance, box, leader)
+            if not found:
+                break
+        place, distance, box, leader = best
+        self.labels.append(box)
+        self.lines.append(leader)
+        return (place - center) / self.point_size, distance
+
+    def _covered(self, number: int, box: Any, leader: Any) -> int:
+        """Return how much a label of a point, and the line that leads to it, would cover."""
+        outside = sum(not self.inside.contains(*corner) for corner in box.get_points())
+        under = sum(line.intersects_bbox(box, filled=False) for line in self.lines)
+        own = self.markers[number]
+        apart = [marker for marker in self.markers if not marker.overlaps(own)]
+        crossed = sum(leader.intersects_bbox(one, filled=False) for one in apart + self.labels)
+        return outside + under + crossed + box.count_overlaps(self.markers + self.labels)

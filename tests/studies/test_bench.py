@@ -10,27 +10,32 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from matplotlib.text import Annotation, Text
 from PIL import Image
 from scipy.optimize import minimize_scalar
 
 import mdfconv
 from mdfconv.conversion import method_named
 from mdfconv.distributions import one_parameter_distributions
+from mdfconv.distributions.base import Printed
+from mdfconv.distributions.ggx import GGX
 from mdfconv.fitting.metrics import list_metrics, metric_named
-from mdfconv.recommend import answers
+from mdfconv.recommend import answers, front, unbeaten
 from mdfconv.studies.bench import (
+    Measurements,
     Sizes,
     Task,
-    compiled_ggx,
     curve_fit_loop,
     kernel_speeds,
     measure,
     method_speeds,
+    plain_loop,
     substitutes,
     sweep,
 )
-from mdfconv.studies.bench_page import front
-from mdfconv.timing import interleave, spread
+from mdfconv.studies.bench_page import CAPTION, figure_of, markdown_page, tables
+from mdfconv.studies.compiled import drjit_evaluation
+from mdfconv.timing import Spread, interleave, spread
 from tests.cli.runner import run, run_on_terminal
 
 TINY = Sizes(angles=512, conversions=64, fits=4, loop=2, rounds=1)
@@ -79,11 +84,12 @@ def test_quick_run_holds_every_row_and_times_with_their_spread(quick):
     assert [row["distribution"] for row in report["substitutes"]] == 2 * NAMES
     assert [row["distribution"] for row in report["kernels"]] == 2 * NAMES
     covering = {"closed-form", "half-angle", "peak", "fit", "fast", "curve_fit"}
+    covering |= {"curve_fit, 200 samples"}
     assert covering <= {row["method"] for row in report["methods"]}
     for table, times in (
         ("substitutes", ("ns_float64", "ns_float32")),
         ("methods", ("per_second",)),
-        ("kernels", ("kernel_ns", "textbook_ns")),
+        ("kernels", ("kernel_ns", "textbook_ns", "copy_ns")),
     ):
         for row in report[table]:
             for name in times:
@@ -93,7 +99,7 @@ def test_quick_run_holds_every_row_and_times_with_their_spread(quick):
 def test_page_is_complete(quick):
     out = quick[1]
     assert out.startswith("# Speed against error\n")
-    assert "![Error against time, distributions and methods](out.png)" in out
+    assert f"![Error against cost, distributions and methods](out.png)\n\n{CAPTION}\n" in out
     for heading in ("Distributions as substitutes", "Conversion methods", "Kernels"):
         assert f"## {heading}" in out
     assert "times as quickly as a loop of SciPy's `curve_fit`" in out
@@ -179,6 +185,30 @@ def test_loop_of_curve_fit_finds_the_same_minimum(name):
     np.testing.assert_allclose(looped, fitted, rtol=tolerance)
 
 
+def test_plain_loop_finds_the_minimum_on_its_samples():
+    values = np.array([0.05, 0.2, 0.5])
+    looped = plain_loop(values, *map(mdfconv.distribution, ("beckmann", "ggx")), None)
+    beta = np.linspace(0, 0.8, 200)
+    for m, found in zip(values, looped, strict=True):
+        wanted = np.exp(-((np.tan(beta) / m) ** 2)) / np.cos(beta) ** 4
+
+        def distance(alpha, wanted=wanted):
+            got = alpha**4 / (1 + (alpha**2 - 1) * np.cos(beta) ** 2) ** 2
+            return np.sum((got - wanted) ** 2)
+
+        least = minimize_scalar(distance, bounds=(0.5 * m, 2 * m), method="bounded")
+        assert found == pytest.approx(least.x, rel=1e-4)
+
+
+def test_plain_loop_of_two_parameters_and_of_what_has_no_start():
+    ends = mdfconv.distribution("gtr").with_gamma(1.5), mdfconv.distribution("student-t")
+    looped = plain_loop(np.array([0.1]), *ends, None)
+    fitted = answers(method_named("fit"), np.array([0.1]), *ends, metric_named("unit"))
+    assert looped == pytest.approx(fitted, rel=0.02)
+    uniform = plain_loop(np.array([1.0]), *map(mdfconv.distribution, ("ggx", "beckmann")), None)
+    assert np.isnan(uniform).all()
+
+
 @pytest.mark.parametrize(
     ("source", "target"),
     [("beckmann", "blinn-phong"), ("ggx", "smoothie"), ("sawicki", "schlick"), ("gauss", "gtr")],
@@ -192,6 +222,15 @@ def test_methods_of_any_pair(source, target):
     assert all(row["parameter_error_max"] == 0 and row["answered"] == 1 for row in fits)
     loops = [row for row in measured if row["method"] == "curve_fit"]
     assert [row["metric"] for row in loops] == list_metrics()
+    assert all(row["over_loop"] == 1 for row in loops)
+    (plain,) = [row for row in measured if row["method"] == "curve_fit, 200 samples"]
+    assert (plain["metric"], plain["over_plain_loop"]) == ("unit", 1)
+    for row in fits:
+        (loop,) = [loop for loop in loops if loop["metric"] == row["metric"]]
+        # Of one round the median of the ratios is the ratio of the medians.
+        for name, other in (("over_loop", loop), ("over_plain_loop", plain)):
+            ratio = row["per_second"].median / other["per_second"].median
+            assert row[name] == pytest.approx(ratio)
     closed = next(row for row in measured if row["method"] == "closed-form")
     assert closed["metric"] == "unit"
     assert closed["rmse_max"] >= closed["rmse"]
@@ -207,7 +246,7 @@ def test_progress_ends_with_the_measurements():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_kernels_allocate_little_more_than_their_result(name):
-    entry, beta = mdfconv.distribution(name), np.linspace(0, np.pi / 2, 1_000_000)
+    entry, beta = mdfconv.distribution(name), np.linspace(0, np.pi / 2, 4_000_000)
     tracemalloc.start()
     entry.unit(beta, entry.parameter.typical_value)
     peak = tracemalloc.get_traced_memory()[1]
@@ -215,17 +254,60 @@ def test_kernels_allocate_little_more_than_their_result(name):
     assert 1 <= peak / beta.nbytes < 1.2
 
 
+def wide(entry):
+    """A parameter of a wide lobe: of narrow ones the printed expressions lose digits in float32."""
+    return 8.3 if entry.parameter.larger_is_smoother else 0.5
+
+
 @pytest.mark.parametrize(("precision", "tolerance"), [("float64", 1e-12), ("float32", 1e-5)])
-def test_compiled_kernel_is_that_of_the_distribution(precision, tolerance):
+@pytest.mark.parametrize("name", NAMES)
+def test_compiled_form_is_that_of_the_distribution(name, precision, tolerance):
+    drjit = pytest.importorskip("drjit")
+    entry, beta = mdfconv.distribution(name), np.linspace(0, 1.55, 999, dtype=precision)
+    evaluate = drjit_evaluation(entry, beta, wide(entry))
+    first, again = evaluate(), evaluate()
+    assert first.state == again.state == drjit.VarState.Evaluated
+    assert first.index != again.index
+    for compiled in (first, again):
+        values = compiled.numpy()
+        assert values.dtype == beta.dtype
+        np.testing.assert_allclose(values, entry.unit(beta, wide(entry)), atol=tolerance)
+    # The code is compiled once for all parameters, which it reads.
+    other = entry.parameter.typical_value
+    with drjit.scoped_set_flag(drjit.JitFlag.KernelHistory):
+        values = drjit_evaluation(entry, beta, other)().numpy()
+        kernels = [kernel for kernel in drjit.kernel_history() if kernel["size"] == beta.size]
+    assert [bool(kernel["cache_hit"]) for kernel in kernels] == [True, True]
+    allowed = tolerance if precision == "float64" else 1e-4
+    np.testing.assert_allclose(values, entry.unit(beta, other), atol=allowed)
+
+
+def test_compiled_form_of_another_gamma():
     pytest.importorskip("drjit")
-    beta = np.linspace(0, np.pi / 2, 999, dtype=precision)
-    wanted = mdfconv.distribution("ggx").unit(beta, 0.2)
-    np.testing.assert_allclose(compiled_ggx(beta, 0.2)().numpy(), wanted, rtol=tolerance)
-    rows = kernel_speeds(tiny(candidates=["ggx"]), ignore)
-    assert [row["precision"] for row in rows] == ["float64", "float32"]
-    assert all(
-        0 < row["drjit_ns"].low <= row["drjit_ns"].median <= row["drjit_ns"].high for row in rows
-    )
+    beta = np.linspace(0, 1.5, 99)
+    entry = mdfconv.distribution("gtr").with_gamma(1.7)
+    values = drjit_evaluation(entry, beta, 0.3)().numpy()
+    np.testing.assert_allclose(values, entry.unit(beta, 0.3), rtol=1e-12)
+
+
+def test_a_form_that_drjit_cannot_compute_is_not_timed():
+    class Odd(GGX):
+        name = "odd-form"
+        printed = Printed.of_alpha(lambda beta, alpha: np.arctan2(alpha, beta))
+
+    assert drjit_evaluation(Odd(), np.linspace(0, 1, 9), 0.2) is None
+
+
+def test_kernels_are_held_to_what_there_is():
+    rows = kernel_speeds(tiny(candidates=["ggx", "schlick"]), ignore)
+    assert [row["precision"] for row in rows] == ["float64"] * 2 + ["float32"] * 2
+    compiled = drjit_evaluation(GGX(), np.linspace(0, 1, 9), 0.2) is not None
+    for row in rows:
+        assert ("drjit_ns" in row) == ("per_drjit" in row) == compiled
+        # Of one round the median of the ratios is the ratio of the medians.
+        for rival in ("textbook", "copy", *["drjit"] * compiled):
+            ratio = row["kernel_ns"].median / row[f"{rival}_ns"].median
+            assert row[f"per_{rival}"] == pytest.approx(ratio)
 
 
 def test_without_drjit_nothing_is_compiled(monkeypatch):
@@ -233,6 +315,108 @@ def test_without_drjit_nothing_is_compiled(monkeypatch):
     rows = kernel_speeds(tiny(candidates=["ggx"]), ignore)
     assert len(rows) == 2
     assert not any("drjit_ns" in row for row in rows)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_one_table_has_all_kernels_with_their_ratios(compiled):
+    measured = measurements(compiled=compiled)
+    rows = tables(measured)["kernels"]
+    assert [row["kernel / copy"] for row in rows] == [8.0, 4.0, 5.0]
+    assert [row["kernel / textbook"] for row in rows] == [0.5, 2.0, 3.0]
+    # Dr.Jit may lack a function of a form.
+    shares = [row.get("kernel / Dr.Jit") for row in rows]
+    assert shares == ([4.0, 3.0, ""] if compiled else [None] * 3)
+    page = markdown_page(measured)
+    assert "0.5 to 3 times as long as the printed expressions in float32" in page
+    assert ("4 to 4 times as long in float32 and 3 to 3 times in float64" in page) == compiled
+
+
+def measurements(substitutes=(), methods=(), *, compiled=False):
+    """Measurements made up for what is shown of them; without any of a kind some are there."""
+    ns = Spread(4.0, 3.0, 5.0)
+    kernels = [
+        {"distribution": name, "precision": precision, "parameter": 0.1, "kernel_ns": ns}
+        | ({"drjit_ns": ns, "per_drjit": per_drjit} if compiled and per_drjit else {})
+        | {"textbook_ns": ns, "copy_ns": ns, "per_textbook": per_textbook, "per_copy": per_copy}
+        for name, precision, per_drjit, per_textbook, per_copy in (
+            ("ggx", "float32", 4.0, 0.5, 8.0),
+            ("ggx", "float64", 3.0, 2.0, 4.0),
+            ("gauss", "float32", None, 3.0, 5.0),
+        )
+    ]
+    substitutes = substitutes or [("ggx", 4.0, 0.1)]
+    kinds = ("closed-form", "fit", "curve_fit", "curve_fit, 200 samples")
+    methods = methods or [(name, "unit", 1e6, 0.01) for name in kinds]
+    everything = {
+        "substitutes": [
+            {
+                "reference": "beckmann", "reference_parameter": 0.2, "distribution": name,
+                "operations": 9, "parameter": 0.1, "rmse": error, "max_error": error,
+                "energy_error": error, "ns_float32": Spread(time, 0.9 * time, 1.2 * time),
+                "ns_float64": ns,
+            }
+            for name, time, error in substitutes
+        ],
+        "methods": [
+            {
+                "from": "beckmann", "to": "ggx", "method": name, "metric": metric, "values": 9,
+                "per_second": Spread(speed, 0.9 * speed, 1.2 * speed), "over_loop": 1.0,
+                "over_plain_loop": 1.0, "parameter_error": error, "parameter_error_max": error,
+                "rmse": error, "rmse_max": error, "answered": 1.0,
+            }
+            for name, metric, speed, error in methods
+        ],
+        "kernels": kernels,
+    }  # fmt: skip
+    return Measurements("a machine", TINY, everything)
+
+
+CROWDED = [
+    ("beckmann", 15.0, 0.0), ("gauss", 3.0, 0.008), ("ggx", 15.1, 0.07), ("gtr", 15.2, 0.07),
+    ("smoothie", 15.15, 0.07), ("student-t", 15.3, 0.07), ("schlick", 15.0, 0.065),
+    ("sawicki", 14.0, 0.06), ("blinn-phong", 30.0, np.nan),
+]  # fmt: skip
+METHODS = [
+    *[("fit", metric, 1e5, 0.0) for metric in list_metrics()],
+    *[("curve_fit", metric, 1e3, 1e-6) for metric in list_metrics()],
+    *[("fast", metric, 1.1e8, 1e-8) for metric in list_metrics()],
+    ("closed-form", "unit", 1e8, 1e-3), ("peak", "unit", 1e8, np.nan),
+    ("curve_fit, 200 samples", "unit", 1.2e3, 1e-6),
+]  # fmt: skip
+
+
+def test_picture_labels_each_point_once_and_none_covers_another():
+    figure = figure_of(measurements(CROWDED, METHODS))
+    assert figure.get_suptitle() == CAPTION
+    shown = [[name for name, *_, error in CROWDED if not np.isnan(error)]] * 2
+    shown.append([name for name, *_, error in METHODS if not np.isnan(error)])
+    figure.draw_without_rendering()
+    for axes, names in zip(figure.axes, shown, strict=True):
+        labels = [text for text in axes.texts if isinstance(text, Annotation)]
+        assert sorted(label.get_text() for label in labels) == sorted(names)
+        boxes = [Text.get_window_extent(label) for label in labels]
+        for number, box in enumerate(boxes):
+            assert box.count_overlaps(boxes[:number]) == 0
+            assert axes.bbox.fully_contains(*box.min)
+            assert axes.bbox.fully_contains(*box.max)
+        for label in labels:
+            place = axes.transData.transform(label.xy)
+            assert not any(box.contains(*place) for box in boxes)
+
+
+def test_picture_of_what_has_no_error():
+    nothing = [("fit", "unit", 1e5, np.nan)]
+    figure = figure_of(measurements([("ggx", 4.0, np.nan)], nothing))
+    assert not any(axes.texts for axes in figure.axes)
+
+
+def test_front_of_the_picture_is_what_recommend_takes():
+    costs = [(15.0, 17, 0.0), (3.0, 23, 0.008), (3.2, 24, 0.007), (15.2, 5, 0.07), (2.0, 6, np.nan)]
+    assert unbeaten(costs, "numpy") == [2, 0]
+    assert unbeaten(costs, "shader") == [3, 0]
+    # The same lobe in another parameter, quicker by noise and nearer by rounding.
+    costs = [(10.0, 5, 1e-9), (9.9, 24, 1e-16), (10.5, 6, 0.0)]
+    assert unbeaten(costs, "numpy") == unbeaten(costs, "shader") == [0]
 
 
 def test_front():

@@ -24,8 +24,8 @@ SOURCE = Candidate("beckmann", 0.2, "none", 2.0, 17, 0.0, 0.0)
 @pytest.mark.parametrize(
     ("tolerance", "use", "chosen"),
     [
-        (0.1, "numpy", "few"),
-        (0.05, "numpy", "quick"),
+        (0.1, "numpy", "sharp"),
+        (0.05, "numpy", "sharp"),
         (0.02, "numpy", "near"),
         (0.005, "numpy", "beckmann"),
         (1e-9, "numpy", "beckmann"),
@@ -39,6 +39,7 @@ def test_cheapest_within_the_tolerance(tolerance, use, chosen):
         SOURCE,
         candidate("quick", 1.0, 20, 0.04),
         candidate("few", 1.09, 5, 0.08),
+        candidate("sharp", 1.05, 26, 0.03),
         candidate("slow", 4.0, 1, 0.01),
         candidate("near", 1.5, 20, 0.01),
         candidate("also", 1.5, 20, 0.02),

@@ -103,6 +103,8 @@ def evaluate(kernel: Kernel, angles: ArrayLike, *operands: ArrayLike, threads: i
     except ValueError:
         shapes = ", ".join(str(array.shape) for array in arrays)
         raise MdfconvError(f"shapes {shapes} do not broadcast against each other") from None
+    if size > _BLOCK:
+        keep_memory()
     # An angle that is infinite in a short type is beyond the horizon.
     with np.errstate(over="ignore"):
         iterator = np.nditer(  # type: ignore[call-overload]
@@ -113,8 +115,6 @@ def evaluate(kernel: Kernel, angles: ArrayLike, *operands: ArrayLike, threads: i
             casting="same_kind",
             buffersize=_BLOCK,
         )
-    if size > _BLOCK:
-        keep_memory()
     with iterator:
         in_parts(partial(_run, kernel, iterator), size, threads)
         result: Any = iterator.operands[-1]

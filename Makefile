@@ -27,8 +27,10 @@ bench: $(VENV)/installed
 	  --png reports/speed-error.png --force > reports/speed-error.tmp
 	mv reports/speed-error.tmp reports/speed-error.md
 
-# The stored polynomials of the method fast, and the 50-digit values of the audit: minutes.
+# The coefficients of the elementary functions, the stored polynomials of the method fast, and the
+# 50-digit values of the audit: minutes.
 data: $(VENV)/installed-test
+	$(BIN)/python -m tests.generate_elementary
 	$(BIN)/python -m tests.generate_fast
 	$(BIN)/python -m tests.generate_stability
 

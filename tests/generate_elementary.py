@@ -11,11 +11,12 @@ from pathlib import Path
 import mpmath as mp
 import numpy as np
 
-mp.mp.dps = 50
 FILE = Path(__file__).parents[1] / "mdfconv/distributions/coefficients.py"
 # Near 0/0 limits are taken.
 _NEARLY = mp.mpf(10) ** -24
-_HALF_PI_SQUARE = mp.pi**2 / 4
+with mp.workdps(50):
+    _HALF_PI_SQUARE = mp.pi**2 / 4
+    _NEAR_SQUARE = mp.asin(0.25) ** 2
 
 
 def tangent(x: mp.mpf) -> mp.mpf:
@@ -53,14 +54,15 @@ FUNCTIONS = {
     "exponential": (exponential, mp.mpf(0.25), {np.float32: (1, 1), np.float64: (2, 2)}),
     "versine": (versine, _HALF_PI_SQUARE, {np.float32: (4, 0), np.float64: (7, 0)}),
     # As far as cos β is less than ¼.
-    "sine": (sine, mp.asin(0.25) ** 2, {np.float32: (2, 0), np.float64: (4, 0)}),
+    "sine": (sine, _NEAR_SQUARE, {np.float32: (2, 0), np.float64: (4, 0)}),
 }
 
 
-def rational(name: str, kind: type) -> tuple[list[float], list[float]]:
+@mp.workdps(50)
+def rational(name: str, kind: type) -> list[list[float]]:
     """Return numerator and denominator, highest power first, rounded to a type.
 
-    The numerator of a fraction begins with 1.
+    The numerator of a fraction begins with 1; a polynomial has no denominator.
     """
     function, end, degrees = FUNCTIONS[name]
     above, below = degrees[kind]
@@ -75,13 +77,13 @@ def rational(name: str, kind: type) -> tuple[list[float], list[float]]:
     solution = list(mp.lu_solve(mp.matrix(rows), mp.matrix(values)))
     numerator, denominator = solution[: above + 1], [mp.mpf(1), *solution[above + 1 :]]
     scale = numerator[-1] if below else 1
-    parts = [
+    return [
         [float(kind(float(one / scale))) for one in reversed(part)]
-        for part in (numerator, denominator)
+        for part in ((numerator, denominator) if below else (numerator,))
     ]
-    return parts[0], parts[1]
 
 
+@mp.workdps(50)
 def half_pi(kind: type) -> tuple[float, float]:
     """Return π/2 in two parts."""
     first = float(kind(np.pi / 2))
@@ -100,21 +102,26 @@ def text() -> str:
         "",
         "",
         "class Coefficients(NamedTuple):",
-        '    """Those of one floating-point type; π/2 is the sum of two numbers."""',
+        '    """Those of one floating-point type.',
+        "",
+        "    π/2 is a sum of two numbers, fractions have a numerator and a denominator.",
+        '    """',
         "",
         "    half_pi: tuple[float, float]",
     ]
-    lines += [f"    {name}: tuple[tuple[float, ...], tuple[float, ...]]" for name in FUNCTIONS]
+    for name in FUNCTIONS:
+        kinds = ", ".join(["tuple[float, ...]"] * len(rational(name, np.float64)))
+        lines.append(f"    {name}: tuple[{kinds}]")
     for kind in (np.float32, np.float64):
-        lines += ["", "", f"{kind.__name__.upper()} = Coefficients("]
-        lines.append(f"    half_pi={half_pi(kind)!r},")
+        lines += [""] * (2 if kind is np.float32 else 0)
+        lines += [f"{kind.__name__.upper()} = Coefficients(", f"    half_pi={half_pi(kind)!r},"]
         for name in FUNCTIONS:
             lines.append(f"    {name}=(")
             for part in rational(name, kind):
                 lines += ["        (", *(f"            {one!r}," for one in part), "        ),"]
             lines.append("    ),")
         lines.append(")")
-    return "\n".join(lines).replace("\n\n\nFLOAT64", "\nFLOAT64") + "\n"
+    return "\n".join(lines) + "\n"
 
 
 if __name__ == "__main__":

@@ -7,13 +7,16 @@ from typing import NamedTuple
 
 
 class Coefficients(NamedTuple):
-    """Those of one floating-point type; π/2 is the sum of two numbers."""
+    """Those of one floating-point type.
+
+    π/2 is a sum of two numbers, fractions have a numerator and a denominator.
+    """
 
     half_pi: tuple[float, float]
     tangent: tuple[tuple[float, ...], tuple[float, ...]]
     exponential: tuple[tuple[float, ...], tuple[float, ...]]
-    versine: tuple[tuple[float, ...], tuple[float, ...]]
-    sine: tuple[tuple[float, ...], tuple[float, ...]]
+    versine: tuple[tuple[float, ...]]
+    sine: tuple[tuple[float, ...]]
 
 
 FLOAT32 = Coefficients(
@@ -47,7 +50,6 @@ FLOAT32 = Coefficients(
             -0.0416666604578495,
             0.5,
         ),
-        (1.0,),
     ),
     sine=(
         (
@@ -55,7 +57,6 @@ FLOAT32 = Coefficients(
             -0.1666662096977234,
             1.0,
         ),
-        (1.0,),
     ),
 )
 FLOAT64 = Coefficients(
@@ -97,7 +98,6 @@ FLOAT64 = Coefficients(
             -0.04166666666666634,
             0.5,
         ),
-        (1.0,),
     ),
     sine=(
         (
@@ -107,6 +107,5 @@ FLOAT64 = Coefficients(
             -0.16666666666662605,
             1.0,
         ),
-        (1.0,),
     ),
 )

@@ -31,7 +31,7 @@ class _Type:
         limits = np.finfo(dtype)
         rounded = partial(np.array, dtype=dtype)
         self.integer = integer
-        self.tangent, self.exponential, (self.versine, _), (self.sine, _) = (
+        self.tangent, self.exponential, (self.versine,), (self.sine,) = (
             tuple([rounded(one) for one in part] for part in parts) for parts in coefficients[1:]
         )
         self.half_pi, self.half_pi_rest = map(rounded, coefficients.half_pi)

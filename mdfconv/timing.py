@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from mdfconv.distributions.evaluation import Array, keep_memory
+from mdfconv.distributions.evaluation import Array
 
 Advance = Callable[[int], None]
 Key = TypeVar("Key")
@@ -50,10 +50,8 @@ def interleave(
     """Time functions in turns, and return the seconds of each by its name.
 
     `rounds` are counted after one that is not; the same place in two arrays is the same round.
-    `advance` is called with 1 after each round, the first one included. Results of a few megabytes
-    stay in the process, so that no time goes into page faults.
+    `advance` is called with 1 after each round, the first one included.
     """
-    keep_memory()
     times = {name: np.empty(rounds + 1) for name in functions}
     order = list(functions)
     shuffle = random.Random(0).shuffle

@@ -27,8 +27,10 @@ Kernel: TypeAlias = Callable[..., Any]
 # Large enough to hide the cost of a call, small enough for the intermediates to stay in cache; no
 # power of 2, which would put the same elements of all arrays into the same lines of the cache.
 _BLOCK = 100_000
-# Bytes, the most for which the GNU C library keeps what is freed.
-_KEPT = 31 << 20
+# The GNU C library returns large blocks to the system, and fresh pages cost more than what is
+# computed in them. Once a block has been freed, of 31 MB at most, it keeps twice as much. This one
+# is never touched.
+np.empty(31 << 20, np.uint8)
 # Smaller arrays are done sooner than threads are started; a few parts for each thread even out
 # what the others are kept from.
 _WORTH_THREADS, _PARTS_A_THREAD = 1 << 20, 4
@@ -103,8 +105,6 @@ def evaluate(kernel: Kernel, angles: ArrayLike, *operands: ArrayLike, threads: i
     except ValueError:
         shapes = ", ".join(str(array.shape) for array in arrays)
         raise MdfconvError(f"shapes {shapes} do not broadcast against each other") from None
-    if size > _BLOCK:
-        keep_memory()
     # An angle that is infinite in a short type is beyond the horizon.
     with np.errstate(over="ignore"):
         iterator = np.nditer(  # type: ignore[call-overload]
@@ -123,16 +123,6 @@ def evaluate(kernel: Kernel, angles: ArrayLike, *operands: ArrayLike, threads: i
     # A mirror's D(0) overflows float16: inf is the answer, not an accident.
     with np.errstate(over="ignore"):
         return result.astype(result_dtype)[()]
-
-
-@cache
-def keep_memory() -> None:
-    """Let the allocator keep the memory of freed blocks.
-
-    The GNU C library returns large blocks to the system, and fresh pages cost more than what is
-    computed in them. Once a block of some size has been freed, it keeps twice as much.
-    """
-    np.empty(_KEPT, np.uint8)
 
 
 def _run(kernel: Kernel, iterator: Any, start: int, end: int) -> None:

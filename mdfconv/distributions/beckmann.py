@@ -131,11 +131,10 @@ def slope_scale(x: Array, y: Array, phi: Array) -> Array:
 
 def _exp_over_cosine_power(angles: Angles, scale: Array, out: Array | None) -> Array:
     """Return e^(k t²) / cos⁴β for k = `scale`."""
-    value = exp_of_product(angles.tangent_square, scale, out)
-    power = 1 + angles.tangent_square
-    np.square(power, out=power)
-    value *= power
-    return value
+    # Its root, which does not underflow where it does not.
+    value = exp_of_product(angles.tangent_square, 0.5 * scale, out)
+    value *= 1 + angles.tangent_square
+    return np.square(value, out=value)
 
 
 DISTRIBUTIONS = (Beckmann(),)

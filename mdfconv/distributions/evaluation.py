@@ -156,9 +156,9 @@ def in_parts(run: Callable[[int, int], None], size: int, threads: int) -> None:
 def inverse_square(values: Array) -> Array:
     """Return 1/values², finite even where values² underflows, so that 0 times it is 0.
 
-    So it stays when it is multiplied by a small number.
+    So it stays when it is multiplied by a number below 2.
     """
-    return np.minimum(1 / (values * values), np.finfo(values.dtype).max / 8)
+    return np.minimum(1 / (values * values), np.finfo(values.dtype).max / 2)
 
 
 @cache

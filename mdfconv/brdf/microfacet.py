@@ -136,9 +136,12 @@ class Microsurface:
 
     def density(self, m: Array) -> Array:
         """Return D at microfacet normals, shape (..., 3); 0 below the surface."""
-        theta = np.minimum(polar_angle(m), np.pi / 2)
-        phi = azimuth(m) if isinstance(self.parameter, tuple) else None
-        return np.where(m[..., 2] > 0, self.at_angle(theta, phi), 0)
+        return np.where(m[..., 2] > 0, self.at_angle(*self.angles(m)), 0)
+
+    def angles(self, m: Array) -> tuple[Array, ...]:
+        """Return the angles of normals for `at_angle`; the horizon for what is none or below."""
+        theta = np.fmin(polar_angle(m), np.pi / 2)
+        return (theta, azimuth(m)) if isinstance(self.parameter, tuple) else (theta,)
 
     def smith_lambda(self, omega: Array) -> Array:
         """Return Smith's Λ for directions.

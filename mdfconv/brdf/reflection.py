@@ -71,8 +71,10 @@ class BrdfSet:
     @cached_property
     def _table(self) -> Array:
         """The lobes at the nodes, shape (nodes, k)."""
-        place = np.arange(_STEPS + 1) / self._scale
-        angle = np.minimum(self._width * place / (1 - place), np.pi / 2)
+        step = np.arange(_STEPS + 1)
+        # The last one is at π/2, of however narrow lobes.
+        angle = self._width * step / (_STEPS - step + _STEPS * self._width / (np.pi / 2))
+        angle = np.minimum(angle, np.pi / 2)
         return np.stack([lobe(angle) for lobe in self._lobes], axis=-1)
 
     def reflected(self, light: Array, view: Array, brought: Array) -> Array:

@@ -150,6 +150,17 @@ def test_all_lobes_under_a_square_light_are_those_of_many_points(brdf, parameter
         np.testing.assert_allclose(picture, expected, atol=1.5e-2 * expected.max())
 
 
+@pytest.mark.parametrize("parameter", [1e-3, 1e-5, 1e-9, 1e-12])
+def test_a_mirror_shows_the_square_itself(parameter):
+    """However narrow a lobe is: the light's radiance, π over its solid angle, times F."""
+    scene = Scene("cook-torrance", "area")
+    lobes = [(distribution(name), parameter) for name in ("beckmann", "ggx", "schlick")]
+    found = radiance(HIGHLIGHT[None], *scene.seen(lobes))[:, 0]
+    solid_angle = 4 * np.arcsin(0.15**2 / (1 + 0.15**2))
+    fresnel = 0.04 + 0.96 * (1 - np.cos(np.pi / 8)) ** 5
+    np.testing.assert_allclose(found, fresnel * np.pi / solid_angle, rtol=2e-3)
+
+
 def test_what_turns_away_is_dark_in_every_lobe():
     scene = Scene(light="area", material="gold")
     lobes = [(distribution(name), 0.1) for name in ("ggx", "beckmann")]

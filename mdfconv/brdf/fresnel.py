@@ -132,7 +132,8 @@ def schlick_fresnel(
     cosine: Array | float, normal_reflectance: Array | float = NORMAL_REFLECTANCE
 ) -> Array | float:
     """Return Schlick's approximation F₀ + (1−F₀) (1−cos)⁵ (Schlick 1994, equation 15)."""
-    return normal_reflectance + (1 - normal_reflectance) * (1 - cosine) ** 5
+    square = (1 - cosine) * (1 - cosine)
+    return normal_reflectance + (1 - normal_reflectance) * (square * square * (1 - cosine))
 
 
 def smoothie_fresnel(

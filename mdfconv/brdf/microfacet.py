@@ -146,6 +146,11 @@ class Microsurface:
         form = self.distribution.normalized if self.normalized else self.distribution.unit
         return np.asarray(form(angles, self.parameter, phi=phi, variable=variable))
 
+    def angles(self, m: Array) -> tuple[Array, ...]:
+        """Return the angles of normals for `at_angle`; the horizon for what is none or below."""
+        theta = np.fmin(polar_angle(m), np.pi / 2)
+        return (theta, azimuth(m)) if isinstance(self.parameter, tuple) else (theta,)
+
     def smith_lambda(self, omega: Array) -> Array:
         """Return Smith's Λ for directions.
 

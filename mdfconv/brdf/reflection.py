@@ -1,18 +1,20 @@
 """The BRDFs into which a distribution can be put.
 
 Each is built from a microsurface, whose D it takes in the form that the surface has, and a Fresnel
-term F of a cosine; the constants are those for a normalized D.
+term F of a cosine; the constants are those for a normalized D. A `BrdfSet` is several at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
 
 from mdfconv.brdf.fresnel import Fresnel
-from mdfconv.brdf.microfacet import Brdf, Masking, Microsurface, above, mirrored, v_cavity
+from mdfconv.brdf.microfacet import Brdf, Masking, Microsurface, above, dot, mirrored, v_cavity
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.registry import Registry
@@ -24,22 +26,113 @@ Normalizer: TypeAlias = Callable[[Array, float], Array]
 _LARGEST_RECURRENCE = 1e5
 
 
-def around_mirror(lobe: Callable[[Array], Array], factor: Callable[[Array], Array | float]) -> Brdf:
+@dataclass(frozen=True)
+class LobeBrdf:
+    """A BRDF that is a lobe times a factor.
+
+    `parts` takes (light, view) to the angles at which the lobe is taken, θ or (θ, φ), and to the
+    factor, which is 0 where either is not above the surface.
+    """
+
+    lobe: Callable[..., Array]
+    parts: Callable[[Array, Array], tuple[tuple[Array, ...], Array]]
+
+    def __call__(self, light: Array, view: Array) -> Array:
+        """Return the BRDF as `Brdf` has it."""
+        angles, factor = self.parts(light, view)
+        return self.lobe(*angles) * factor
+
+
+# Steps of the table: a smooth lobe up to five times as wide or as narrow keeps 1e-7 of its peak.
+_STEPS = 2048
+
+
+class BrdfSet:
+    """BRDFs that differ in their lobes alone, in one picture.
+
+    For many samples of light the lobes are interpolated by cubics between equal steps of
+    θ/(θ + width). What the samples send is a sum over nodes, whose weights all lobes share: another
+    lobe costs next to nothing.
+
+    Parameters
+    ----------
+    brdfs : sequence of LobeBrdf
+        The k BRDFs, isotropic, the same but for the lobes.
+    width : float
+        About the half width of the lobes, radians.
+    """
+
+    def __init__(self, brdfs: Sequence[LobeBrdf], width: float) -> None:
+        self._parts = brdfs[0].parts
+        self._lobes = [brdf.lobe for brdf in brdfs]
+        self._width = width
+        self._scale = _STEPS * (1 + width / (np.pi / 2))
+
+    @cached_property
+    def _table(self) -> Array:
+        """The lobes at the nodes, shape (nodes, k)."""
+        step = np.arange(_STEPS + 1)
+        # The last one is at π/2, of however narrow lobes.
+        angle = self._width * step / (_STEPS - step + _STEPS * self._width / (np.pi / 2))
+        angle = np.minimum(angle, np.pi / 2)
+        return np.stack([lobe(angle) for lobe in self._lobes], axis=-1)
+
+    def reflected(self, light: Array, view: Array, brought: Array) -> Array:
+        """Return what s samples of light for each of m surfaces send to the viewer.
+
+        Parameters
+        ----------
+        light, view : numpy.ndarray, shape (m s, 3)
+            Directions, as for `Brdf`.
+        brought : numpy.ndarray, shape (m, s)
+            What a sample brings: its irradiance on the surface.
+
+        Returns
+        -------
+        numpy.ndarray, shape (k, m), or (k, 3, m) in colour
+            The radiance.
+        """
+        (angle,), factor = self._parts(light, view)
+        channels = np.atleast_2d(factor * brought.ravel())
+        if brought.shape[1] == 1:
+            sent = np.stack([lobe(angle) for lobe in self._lobes])[:, None] * channels
+        else:
+            sent = np.stack([self._sums(angle, weight, brought.shape) for weight in channels], 1)
+        return sent if factor.ndim > 1 else sent[:, 0]
+
+    def _sums(self, angle: Array, weight: Array, shape: tuple[int, int]) -> Array:
+        """Return the sums over samples of weights times lobes, shape (k, m)."""
+        from scipy.sparse import csr_array
+
+        place = angle * (self._scale / (angle + self._width))
+        node = np.clip(place.astype(np.int32), 1, _STEPS - 2)
+        a = place - node
+        b, c, d = a + 1, a - 1, a - 2
+        shares = np.stack([a * c * d / -6, b * c * d / 2, a * b * d / -2, a * b * c / 6], axis=-1)
+        shares *= weight[:, None]
+        nodes = node[:, None] + np.arange(-1, 3, dtype=np.int32)
+        ends = 4 * shape[1] * np.arange(shape[0] + 1)
+        rows = csr_array((shares.ravel(), nodes.ravel(), ends), shape=(shape[0], _STEPS + 1))
+        return np.asarray((rows @ self._table).T)
+
+
+def around_mirror(
+    lobe: Callable[[Array], Array], factor: Callable[[Array], Array | float]
+) -> LobeBrdf:
     """Return the BRDF lobe(θ_r) factor(n·v) for θ_r < π/2.
 
     A lobe with long tails ends with an edge. The factor is the Fresnel term, or what normalizes
     the lobe.
     """
 
-    def brdf(light: Array, view: Array) -> Array:
+    def parts(light: Array, view: Array) -> tuple[tuple[Array], Array]:
         # By the chord: an arccos loses its digits near 0.
         chord = np.linalg.norm(light - mirrored(view), axis=-1)
         angle = 2 * np.arcsin(np.minimum(0.5 * chord, 1))
         lit = above(light, view) & (angle < 0.5 * np.pi)
-        value = np.where(lit, lobe(np.where(lit, angle, 0)), 0)
-        return value * factor(np.maximum(view[..., 2], 0))
+        return (np.where(lit, angle, 0),), lit * factor(np.maximum(view[..., 2], 0))
 
-    return brdf
+    return LobeBrdf(lobe, parts)
 
 
 def original(exponent: float) -> Brdf:
@@ -133,7 +226,7 @@ NORMALIZERS.add("mallett-yuksel", mallett_yuksel)
 _Geometry: TypeAlias = Callable[[Array, Array, Array, Array], Array]
 
 
-def microfacet(surface: Microsurface, fresnel: Fresnel, masking: Masking) -> Brdf:
+def microfacet(surface: Microsurface, fresnel: Fresnel, masking: Masking) -> LobeBrdf:
     """Return D F G / (4 (n·l)(n·v)) (Cook & Torrance 1981), which is reciprocal.
 
     Parameters
@@ -152,12 +245,12 @@ def microfacet(surface: Microsurface, fresnel: Fresnel, masking: Masking) -> Brd
     return _from_half_vectors(surface, fresnel, geometry)
 
 
-def cook_torrance(surface: Microsurface, fresnel: Fresnel) -> Brdf:
+def cook_torrance(surface: Microsurface, fresnel: Fresnel) -> LobeBrdf:
     """Return the microfacet BRDF with V-cavities (Cook & Torrance 1981)."""
     return microfacet(surface, fresnel, v_cavity)
 
 
-def ashikhmin_shirley(surface: Microsurface, fresnel: Fresnel) -> Brdf:
+def ashikhmin_shirley(surface: Microsurface, fresnel: Fresnel) -> LobeBrdf:
     """Return D F / (4 (l·m) max(n·l, n·v)) (Ashikhmin & Shirley 2000, eq. 3)."""
 
     def geometry(light: Array, view: Array, m: Array, cosine: Array) -> Array:
@@ -166,7 +259,7 @@ def ashikhmin_shirley(surface: Microsurface, fresnel: Fresnel) -> Brdf:
     return _from_half_vectors(surface, fresnel, geometry)
 
 
-def smoothie(surface: Microsurface, fresnel: Fresnel) -> Brdf:
+def smoothie(surface: Microsurface, fresnel: Fresnel) -> LobeBrdf:
     """Return D F / (h·h), h = l + v not normalized (Smoothie: an empirical BRDF).
 
     That is the microfacet BRDF with the masking of Kelemen and Szirmay-Kalos 2001. D is
@@ -178,7 +271,7 @@ def smoothie(surface: Microsurface, fresnel: Fresnel) -> Brdf:
     )
 
 
-def smoothie_approx(surface: Microsurface, fresnel: Fresnel) -> Brdf:
+def smoothie_approx(surface: Microsurface, fresnel: Fresnel) -> LobeBrdf:
     """Return D F / 4 with D at the angle β' of 2 sin β' = ‖h − n (n·h)‖, h = l + v, and no G.
 
     The article replaces 4 sin²β, in its D, by ‖h − n (n·h)‖²; any D follows at the angle of
@@ -188,16 +281,15 @@ def smoothie_approx(surface: Microsurface, fresnel: Fresnel) -> Brdf:
     this one, with the normalized D.
     """
 
-    def brdf(light: Array, view: Array) -> Array:
+    def parts(light: Array, view: Array) -> tuple[tuple[Array], Array]:
         h = light + view
         sine = np.minimum(0.5 * np.hypot(h[..., 0], h[..., 1]), 1)
-        value = 0.25 * surface.at_angle(np.arcsin(sine))
-        return np.where(above(light, view), value, 0) * fresnel(_half_length(h))
+        return (np.arcsin(sine),), 0.25 * above(light, view) * fresnel(_half_length(h))
 
-    return brdf
+    return LobeBrdf(surface.at_angle, parts)
 
 
-def modified_phong(surface: Microsurface, fresnel: Fresnel) -> Brdf:
+def modified_phong(surface: Microsurface, fresnel: Fresnel) -> LobeBrdf:
     """Return D(θ_r) F(n·v), θ_r the angle of the light with the viewer's mirror image.
 
     The modified Phong BRDF (γ+2)/(2π) cos^γ θ_r (Lafortune & Willems 1994) is Blinn/Phong's
@@ -207,31 +299,32 @@ def modified_phong(surface: Microsurface, fresnel: Fresnel) -> Brdf:
     return around_mirror(surface.at_angle, fresnel)
 
 
-def _from_half_vectors(surface: Microsurface, fresnel: Fresnel, geometry: _Geometry) -> Brdf:
+def _from_half_vectors(surface: Microsurface, fresnel: Fresnel, geometry: _Geometry) -> LobeBrdf:
     """Return D(m) F(l·m) times a geometric factor."""
 
-    def brdf(light: Array, view: Array) -> Array:
+    def parts(light: Array, view: Array) -> tuple[tuple[Array, ...], Array]:
         h = light + view
         # ½‖h‖ is the cosine, with its digits where both graze.
         cosine = _half_length(h)
         # Below the surface the factors may be infinite or none; they are not used.
         with np.errstate(divide="ignore", invalid="ignore"):
             m = h / (2 * cosine[..., None])
-            value = surface.density(m) * geometry(light, view, m, cosine)
-        return np.where(above(light, view), value, 0) * fresnel(cosine)
+            factor = np.where(above(light, view), geometry(light, view, m, cosine), 0)
+        return surface.angles(m), factor * fresnel(cosine)
 
-    return brdf
+    return LobeBrdf(surface.at_angle, parts)
 
 
 def _half_length(h: Array) -> Array:
     """Return the cosine of the half vector with light or viewer: half the length of l + v."""
-    length: Array = np.linalg.norm(h, axis=-1)
-    return np.minimum(0.5 * length, 1)
+    return np.minimum(0.5 * np.sqrt(dot(h, h)), 1)
 
 
-BRDFS: Registry[Callable[[Microsurface, Fresnel], Brdf]] = Registry("BRDF")
+BRDFS: Registry[Callable[[Microsurface, Fresnel], LobeBrdf]] = Registry("BRDF")
 BRDFS.add("ashikhmin-shirley", ashikhmin_shirley)
 BRDFS.add("cook-torrance", cook_torrance)
 BRDFS.add("smoothie", smoothie)
 BRDFS.add("smoothie-approx", smoothie_approx)
 BRDFS.add("modified-phong", modified_phong)
+# In directions of the light a lobe is as wide as in θ; of the others it is twice as wide.
+AROUND_MIRROR = ("modified-phong",)

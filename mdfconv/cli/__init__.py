@@ -18,7 +18,6 @@ from typer.core import TyperCommand, TyperGroup
 from mdfconv import __version__
 from mdfconv.cli.completion import whole_words
 from mdfconv.cli.process import run
-from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
 from mdfconv.registry import unknown_name
 
@@ -54,6 +53,8 @@ class _Command(TyperCommand):
         try:
             return super().parse_args(ctx, args)
         except typer.BadParameter as error:
+            from mdfconv.distributions.parameter import percent_hint
+
             wrong = _NO_NUMBER.match(error.message)
             hint = percent_hint(wrong[1]) if wrong else ""
             if hint:

@@ -20,12 +20,12 @@ def command(
 
     mdfconv report --output /tmp/mdfconv-report
     """
-    from mdfconv.studies.report import INDEX, PAGES, build
+    from mdfconv.studies.report import INDEX, PAGES, WORK, build
 
     folder = check_folder(context, output)
     names = [name for page in PAGES for name in page.files] + [INDEX]
     # What exists is found before minutes of work.
     outputs = Outputs(*(folder / name for name in names), force=force)
-    with progress("Report", len(PAGES)) as advance:
+    with progress("Report", WORK) as advance:
         files = build(advance)
     outputs.write({folder / name: content for name, content in files.items()})

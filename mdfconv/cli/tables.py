@@ -227,7 +227,7 @@ def console(stream: IO[str] | None = None, width: int | None = None) -> Console:
 
 
 @contextmanager
-def progress(description: str, total: int) -> Iterator[Callable[[int], None]]:
+def progress(description: str, total: int) -> Iterator[Callable[[float], None]]:
     """Show a bar on a terminal, nothing in a pipe; yield what advances it."""
     from rich.console import Console
     from rich.progress import Progress

@@ -62,6 +62,12 @@ def line_style(name: str) -> dict[str, Any]:
 def encoded(figure: Any, form: str = "png", dpi: int = 150) -> bytes:
     """Return a figure as the bytes of a file, the same for the same figure."""
     buffer = io.BytesIO()
-    options = _PNG if form == "png" else {"metadata": {"Date": None}}
+    options: dict[str, Any] = {"metadata": {"Date": None}}
+    if form == "png":
+        options = _PNG
+        # Matplotlib would draw it unseen first, to lay it out.
+        figure.set_dpi(dpi)
+        figure.get_layout_engine().execute(figure)
+        figure.set_layout_engine(None)
     figure.savefig(buffer, format=form, dpi=dpi, **options)
     return buffer.getvalue()

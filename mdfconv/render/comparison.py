@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from mdfconv.brdf.fresnel import material, schlick_fresnel
-from mdfconv.brdf.microfacet import Brdf, Microsurface
-from mdfconv.brdf.reflection import BRDFS
+from mdfconv.brdf.microfacet import Microsurface
+from mdfconv.brdf.reflection import AROUND_MIRROR, BRDFS, BrdfSet, LobeBrdf
 from mdfconv.conversion import convert, method_named
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.endpoint import Endpoint, one_parameter_endpoint
@@ -20,7 +20,7 @@ from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.metrics.base import srgb
 from mdfconv.output.records import rounded_rows
 from mdfconv.render import sphere
-from mdfconv.render.sphere import MARGIN, Frame
+from mdfconv.render.sphere import LIGHTS, MARGIN, Frame, Lights
 
 # Sawicki 2021, captions of Figures 1 and 2.
 PAPER_SETS: Mapping[str, Mapping[str, float]] = {
@@ -91,11 +91,19 @@ class Scene:
         if not (np.isfinite(self.exposure) and self.exposure > 0):
             raise MdfconvError("the exposure is a positive number")
 
-    def surface(self, mdf: Distribution, parameter: float) -> Brdf:
+    def surface(self, mdf: Distribution, parameter: float) -> LobeBrdf:
         """Return the BRDF with a distribution put in."""
         fresnel = material(self.material).fresnel if self.material else schlick_fresnel
         facets = Microsurface(mdf, parameter, self.normalized)
         return BRDFS[self.brdf](facets, fresnel)
+
+    def seen(self, lobes: Sequence[tuple[Distribution, float]]) -> tuple[BrdfSet, Lights]:
+        """Return the BRDF with each distribution put in, and the light in samples for them all."""
+        widths = np.fmin([mdf.half_width(parameter) for mdf, parameter in lobes], 1)
+        width = float(np.sqrt(widths.min() * widths.max()))
+        brdf = BrdfSet([self.surface(*lobe) for lobe in lobes], width)
+        in_light = width * (1 if self.brdf in AROUND_MIRROR else 2)
+        return brdf, LIGHTS[self.light].resolved(in_light)
 
 
 @dataclass(frozen=True)
@@ -265,7 +273,7 @@ def compare(
     rows = {rule.label: [reference.converted(end, rule) for end in ends] for rule in rules}
     mdf, parameter = reference.lobe
     extent = float(lobe_extent(mdf, np.asarray(parameter)))
-    extent = sphere.highlight_extent(extent, sphere.LIGHTS[scene.light])
+    extent = sphere.highlight_extent(extent, LIGHTS[scene.light])
     frame = _closeup_frame(extent, scene.size)
     position, normals = sphere.cross_section(_SECTION_POINTS, min(extent, 1.0))
     surfaces = [reference, *(surface for row in rows.values() for surface in row)]
@@ -291,18 +299,12 @@ def _rendered(
     """
     lobes = {surface: surface.lobe for surface in surfaces}
     numbers = {lobe: number for number, lobe in enumerate(dict.fromkeys(lobes.values()))}
-    brdfs = [scene.surface(*lobe) for lobe in numbers]
-
-    def side_by_side(toward: Array, view: Array) -> Array:
-        return np.stack([brdf(toward, view) for brdf in brdfs])
-
-    reference = surfaces[0]
-    mdf, parameter = reference.lobe
-    light = sphere.LIGHTS[scene.light].resolved(float(mdf.half_width(parameter)))
+    brdf, light = scene.seen([*numbers])
     whole = Frame(scene.size)
-    images = whole.render(side_by_side, light)
-    closeups = images if closeup == whole else closeup.render(side_by_side, light)
-    sections = sphere.radiance(normals, side_by_side, light)
+    images = whole.render(brdf, light)
+    closeups = images if closeup == whole else closeup.render(brdf, light)
+    sections = sphere.radiance(normals, brdf, light)
+    reference = surfaces[0]
     if images[0].max() < _LEAST_PEAK * sections[0].max():
         raise MdfconvError(
             f"the highlight of {reference.name} {reference.value_text} "

@@ -57,6 +57,9 @@ def draw_comparison(comparison: PictureComparison, dpi: int = 120) -> bytes:
     table = _PictureTable(figure.add_subplot(parts[0]), 2 * rules, columns, side)
     _draw_pictures(table, comparison)
     scale = _draw_differences(table, comparison)
+    # It ends where its axes end: the layout need not look at dozens of pictures and texts.
+    for artist in table.axes.get_children():
+        artist.set_in_layout(False)
     _draw_bar(figure.add_subplot(parts[1].subgridspec(1, 3)[1]), scale, comparison.reference)
     plots = parts[2].subgridspec(1, rules).subplots(sharey=True, squeeze=False)[0]
     _draw_sections(plots, comparison)

@@ -22,7 +22,7 @@ from mdfconv.errors import MdfconvError
 from mdfconv.output.figures import PAGE, encoded, new_figure
 from mdfconv.output.records import csv_text, markdown_text
 from mdfconv.registry import Registry
-from mdfconv.studies.pages import PageFiles, fill, pivot
+from mdfconv.studies.pages import PageFiles, fill, pivot, tracked
 
 
 def cosine_lobe(axis: Array, exponent: float, u1: Array, u2: Array) -> Array:
@@ -411,13 +411,11 @@ _RESPONSE_ALPHAS = (0.01, 0.1, 0.25, 0.5, 1.0)
 
 def furnace() -> PageFiles:
     """Return the white furnace of the BRDFs."""
-    albedos = {
-        panel: {
-            label: directional_albedo(furnace_model(name, parameter, **options), _COSINES).tolist()
-            for label, (name, parameter, options) in models.items()
-        }
-        for panel, (_, models) in _PANELS.items()
-    }
+    albedos: dict[str, dict[str, list[float]]] = {panel: {} for panel in _PANELS}
+    models = [(panel, *model) for panel, (_, some) in _PANELS.items() for model in some.items()]
+    for panel, label, (name, parameter, options) in tracked(models):
+        model = furnace_model(name, parameter, **options)
+        albedos[panel][label] = directional_albedo(model, _COSINES).tolist()
     columns = {
         f"{panel}: {label}": values
         for panel, curves in albedos.items()

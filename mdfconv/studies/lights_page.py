@@ -42,7 +42,6 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import k0, k1
-from scipy.stats import spearmanr
 
 from mdfconv.distributions import Distribution, distribution, one_parameter_distributions
 from mdfconv.distributions.evaluation import Array
@@ -225,7 +224,7 @@ def lights() -> PageFiles:
         lowest=_LOWEST,
         ends={name: int(np.sum(each == _LOWEST)) for name, each in best},
         signed={f"{m_b:g}": np.median(off[renders.m_b == m_b]) for m_b in np.unique(renders.m_b)},
-        rank={name: spearmanr(renders.predicted, each).statistic for name, each in best},
+        rank={name: _rank_correlation(renders.predicted, each) for name, each in best},
         exponent={"least": exponents.min(), "largest": exponents.max()},
         constants=_constant_table(constants),
         student=student,
@@ -241,6 +240,15 @@ def lights() -> PageFiles:
     rows = [one.record() for one in constants]
     tables = [csv_text(list(table[0]), table) for table in (cases, rows)]
     return PageFiles([page, *tables, draw_lights(renders, exponents, metrics)], figures)
+
+
+def _rank_correlation(one: Array, other: Array) -> float:
+    """Return Spearman's correlation of ranks, the mean of them where values are equal."""
+    ranks = []
+    for values in (one, other):
+        _, place, count = np.unique(values, return_inverse=True, return_counts=True)
+        ranks.append((np.cumsum(count) - 0.5 * count)[place])
+    return float(np.corrcoef(ranks)[0, 1])
 
 
 def _fitted(target: str, m_b: Array, metric: str) -> Array:

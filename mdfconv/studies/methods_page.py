@@ -18,7 +18,7 @@ from mdfconv.fitting.metrics import Metric, list_metrics, metric_named
 from mdfconv.output.records import csv_text
 from mdfconv.recommend import answers
 from mdfconv.studies.bench import as_wide
-from mdfconv.studies.pages import PageFiles, fill, pivot
+from mdfconv.studies.pages import PageFiles, fill, pivot, tracked
 
 # Beckmann's m_B for lobes of the same half width.
 _RANGES = {
@@ -68,7 +68,7 @@ def _compare(
 ) -> _Errors:
     """Return the errors of all formulas, each of which answers once for a pair."""
     errors: _Errors = {}
-    for (widths, m_b), (source, target) in product(_RANGES.items(), pairs):
+    for (widths, m_b), (source, target) in tracked([*product(_RANGES.items(), pairs)]):
         parameter = as_wide(m_b, source)
         parameter = parameter[~np.isnan(parameter)]
         covering = [method for method in formulas if method.covers(source, target, metrics[0])]

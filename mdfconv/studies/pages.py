@@ -7,12 +7,34 @@ figure ``error``, with Python's rules of format; a table is the figure ``{table}
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from importlib.resources import files
 from string import Formatter
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from mdfconv.output.records import markdown_text
+
+Item = TypeVar("Item")
+_tell: ContextVar[Callable[[float], None]] = ContextVar("tell", default=lambda share: None)
+
+
+@contextmanager
+def heard_by(tell: Callable[[float], None]) -> Iterator[None]:
+    """Let a function hear how the pages that are made meanwhile get on."""
+    token = _tell.set(tell)
+    try:
+        yield
+    finally:
+        _tell.reset(token)
+
+
+def tracked(items: Collection[Item]) -> Iterator[Item]:
+    """Yield what most of a page is made from; after each, say which share of the page is done."""
+    for item in items:
+        yield item
+        _tell.get()(1 / len(items))
 
 
 class PageFiles(NamedTuple):

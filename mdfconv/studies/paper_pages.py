@@ -14,7 +14,7 @@ from mdfconv.render.page import filled, page_data
 from mdfconv.scene.shininess import ROUGHNESS
 from mdfconv.studies import table2 as paper_table
 from mdfconv.studies.error_curves import Curves, curves, draw_errors
-from mdfconv.studies.pages import PageFiles, fill, pivot
+from mdfconv.studies.pages import PageFiles, fill, pivot, tracked
 
 _UNIT = "unit"
 # The paper states the largest error of Blinn/Phong for these exponents.
@@ -85,7 +85,7 @@ def errors() -> PageFiles:
     figures["blinn_phong"] = {n: _largest(curves(pair))["blinn-phong"] for n, pair in pairs.items()}
     page = fill("errors", maxima=markdown_text(list(maxima[0]), maxima), **figures)
     files: list[str | bytes] = [page]
-    for name, each in drawn.items():
+    for name, each in tracked(drawn.items()):
         files += [draw_errors(each, f"Sawicki 2021, {name}", dpi=_FIGURE_DPI), each.error_text()]
     return PageFiles(files, figures)
 
@@ -101,7 +101,7 @@ def pictures() -> PageFiles:
     rows: list[dict[str, Any]] = []
     scene = spheres.Scene(size=_PICTURE_SIZE)
     rules = spheres.default_rules(scene.exposure)
-    for name, m_b in spheres.PAPER_FIGURES.items():
+    for name, m_b in tracked(spheres.PAPER_FIGURES.items()):
         comparison = spheres.compare(m_b, rules, scene)
         files += [draw_comparison(comparison, _FIGURE_DPI), csv_text(*comparison.section_rows())]
         rows += [{"figure": name} | row for row in comparison.table()]

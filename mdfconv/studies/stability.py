@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from decimal import Decimal
-from itertools import groupby
+from itertools import groupby, product
 from operator import attrgetter
 from typing import Any, TypeAlias
 
@@ -27,7 +27,7 @@ from mdfconv.errors import MdfconvWarning
 from mdfconv.fitting.metrics import metric_named
 from mdfconv.fitting.problem import ConversionTask
 from mdfconv.output.records import csv_text
-from mdfconv.studies.pages import PageFiles, fill, pivot, read_rows
+from mdfconv.studies.pages import PageFiles, fill, pivot, read_rows, tracked
 
 # Of the kernels. Conversions compute in float64 throughout: float32 rounds input and result.
 _KERNEL_TYPES = (np.float64, np.float32, np.float16)
@@ -409,7 +409,8 @@ def stability() -> PageFiles:
     rows = [
         finding.record()
         | {name: _magnitude(getattr(finding, name)) for name in ("error", "textbook")}
-        for finding in audit()
+        for part, mdf in tracked([*product(_PARTS, list_distributions())])
+        for finding in audit([mdf.name], part)
     ]
     kernels = [row for row in rows if row["rule"] in _KERNELS]
     by_type = {

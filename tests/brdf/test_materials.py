@@ -5,7 +5,7 @@ import pytest
 
 from mdfconv.brdf.fresnel import METALS, PLASTICS, list_materials, lossless, material
 from mdfconv.brdf.microfacet import Microsurface, direction, frames, kelemen_szirmay_kalos
-from mdfconv.brdf.reflection import BRDFS, microfacet, modified
+from mdfconv.brdf.reflection import BRDFS, BrdfSet, LobeBrdf, microfacet, modified
 from mdfconv.distributions import distribution
 from mdfconv.errors import MdfconvError
 
@@ -113,3 +113,41 @@ def test_a_metal_scales_the_channels(brdf):
     for channel, least in zip(colored, METALS["copper"], strict=True):
         expected = grey * (least + (1 - least) * (1 - cosine) ** 5)
         np.testing.assert_allclose(channel, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("fresnel", ["acrylic", "gold"])
+@pytest.mark.parametrize("samples", [1, 5])
+@pytest.mark.parametrize("brdf", BRDFS.names)
+def test_a_set_of_brdfs_sends_what_each_alone_does(brdf, samples, fresnel):
+    """The sum over samples, which for more than one goes through a table."""
+    random = np.random.default_rng(3)
+    theta = np.concatenate([0.05 * random.exponential(size=500), random.uniform(0, 1.6, 500)])
+    view = direction(random.uniform(0, 1.5, theta.size), random.uniform(0, 7, theta.size))
+    m = direction(theta, random.uniform(0, 7, theta.size))
+    light = 2 * np.sum(view * m, axis=1)[:, None] * m - view
+    light[-1] = -view[-1]  # no half vector
+    lobes = [("ggx", 0.04), ("ggx", 0.5), ("beckmann", 0.05), ("blinn-phong", 2000.0)]
+    lobes += [("gauss", 0.1), ("smoothie", 0.1)]
+    brdfs = [
+        BRDFS[brdf](Microsurface(distribution(name), parameter), material(fresnel).fresnel)
+        for name, parameter in lobes
+    ]
+    brought = random.random((theta.size // samples, samples))
+    found = BrdfSet(brdfs, 0.07).reflected(light, view, brought)
+    for one, sent in zip(brdfs, found, strict=True):
+        values = one(light, view) * brought.ravel()
+        alone = values.reshape(*values.shape[:-1], *brought.shape).sum(axis=-1)
+        assert sent.shape == alone.shape
+        tolerance = 1e-14 if samples == 1 else 1e-6
+        np.testing.assert_allclose(sent, alone, rtol=1e-13, atol=tolerance * alone.max())
+
+
+@pytest.mark.parametrize("name", ["schlick", "student-t", "gtr"])
+def test_the_table_ends_at_the_horizon_and_holds_an_edge(name):
+    lobe = Microsurface(distribution(name), 0.3)
+    theta = np.array([0, 1e-9, 0.1, 0.7, 0.8, 1.4, np.pi / 2])
+    light, view = direction(theta), np.tile([0.0, 0, 1], (theta.size, 1))
+    brdf = LobeBrdf(lobe.at_angle, lambda light, view: ((theta.repeat(2),), np.ones(14)))
+    brought = np.tile([1.0, 0.0], (theta.size, 1))
+    found = BrdfSet([brdf], 0.2).reflected(light.repeat(2, 0), view.repeat(2, 0), brought)[0]
+    np.testing.assert_allclose(found, lobe.at_angle(theta), atol=1e-6 * found[0])

@@ -135,6 +135,39 @@ def test_a_square_light_has_no_dots_on_a_smooth_surface(name, parameter, brdf):
     np.testing.assert_allclose(found, expected, atol=1e-2 * expected.max())
 
 
+@pytest.mark.parametrize("brdf", BRDFS.names)
+@pytest.mark.parametrize("parameter", [0.02, 0.2, 0.8])
+def test_all_lobes_under_a_square_light_are_those_of_many_points(brdf, parameter):
+    """Also of lobes twice as narrow and half as wide again, in the samples that all share."""
+    scene = Scene(brdf, "area")
+    lobes = [("beckmann", 1.0), ("ggx", 0.6), ("gauss", 1.5), ("smoothie", 1.0)]
+    lobes = [(distribution(name), share * parameter) for name, share in lobes]
+    normals = cross_section(20, 0.2)[1]
+    found = radiance(normals, *scene.seen(lobes))
+    points = many_points(100)
+    for lobe, picture in zip(lobes, found, strict=True):
+        expected = radiance(normals, scene.surface(*lobe), points)
+        np.testing.assert_allclose(picture, expected, atol=1.5e-2 * expected.max())
+
+
+@pytest.mark.parametrize("parameter", [1e-3, 1e-5, 1e-9, 1e-12])
+def test_a_mirror_shows_the_square_itself(parameter):
+    """However narrow a lobe is: the light's radiance, π over its solid angle, times F."""
+    scene = Scene("cook-torrance", "area")
+    lobes = [(distribution(name), parameter) for name in ("beckmann", "ggx", "schlick")]
+    found = radiance(HIGHLIGHT[None], *scene.seen(lobes))[:, 0]
+    solid_angle = 4 * np.arcsin(0.15**2 / (1 + 0.15**2))
+    fresnel = 0.04 + 0.96 * (1 - np.cos(np.pi / 8)) ** 5
+    np.testing.assert_allclose(found, fresnel * np.pi / solid_angle, rtol=2e-3)
+
+
+def test_what_turns_away_is_dark_in_every_lobe():
+    scene = Scene(light="area", material="gold")
+    lobes = [(distribution(name), 0.1) for name in ("ggx", "beckmann")]
+    away = np.array([[0.0, 0.0, -1.0], [0.6, -0.8, 0.0]])
+    np.testing.assert_array_equal(radiance(away, *scene.seen(lobes)), np.zeros((2, 3, 2)))
+
+
 def test_silhouette_is_antialiased():
     coverage = Frame(64).normals()[1]
     assert coverage.sum() == pytest.approx(np.pi / (2 * 1.04) ** 2 * 64**2, rel=1e-3)

@@ -4,10 +4,12 @@ import mpmath as mp
 import numpy as np
 import pytest
 from scipy.special import k1
+from scipy.stats import spearmanr
 
 import mdfconv
 from mdfconv.studies.lights_page import (
     RULES,
+    _rank_correlation,
     best_ratio,
     cost_table,
     equivalent_exponent,
@@ -103,3 +105,12 @@ def test_laws_of_smooth_surfaces():
         assert law.exact == (abs(law.deviation) < 1e-12)
         back = laws[target, source]
         assert law.constant * back.constant**law.power == pytest.approx(1, rel=2e-6)
+
+
+def test_rank_correlation_is_that_of_scipy():
+    random = np.random.default_rng(5)
+    for spread in (2, 5, 1000):
+        one = random.integers(0, spread, 40)
+        other = one + random.integers(0, spread, 40)
+        expected = spearmanr(one, other).statistic
+        assert _rank_correlation(one, other) == pytest.approx(expected, rel=1e-12)

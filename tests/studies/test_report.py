@@ -8,6 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from mdfconv.errors import MdfconvError
+from mdfconv.studies.pages import PageFiles, tracked
 from mdfconv.studies.paper_pages import closed_forms, table2, table2_by_metric
 from mdfconv.studies.report import INDEX, PAGES, Page, build, made
 from tests.cli.runner import run
@@ -26,7 +27,7 @@ def folder(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "cpu_count", lambda: 1)
         patch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"a picture"))
-        for name, content in build(lambda pages: None).items():
+        for name, content in build(lambda work: None).items():
             (path / name).write_bytes(content)
     return path
 
@@ -79,7 +80,7 @@ def refuse():
 
 @pytest.mark.parametrize("processes", [1, 2])
 def test_a_page_that_cannot_be(processes):
-    pages = made([Page(table2, ()), Page(refuse, ()), Page(closed_forms, ())], processes)
+    pages = made([Page(table2, ()), Page(refuse, ()), Page(closed_forms, ())], print, processes)
     assert "# Table 2" in next(pages).files[0]
     with pytest.raises(MdfconvError, match="no such light; there are two") as caught:
         next(pages)
@@ -87,8 +88,35 @@ def test_a_page_that_cannot_be(processes):
     assert multiprocessing.active_children() == []
 
 
+def parts():
+    for _ in tracked("abcd"):
+        pass
+    return PageFiles(["parts"], {})
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_the_bar_hears_of_parts_and_of_all_work(processes):
+    heard = []
+    pages = [Page(parts, (), 10), Page(table2, (), 3)]
+    assert [page.files[0][:5] for page in made(pages, heard.append, processes)] == [
+        "parts", "# Tab",
+    ]  # fmt: skip
+    assert sorted(heard) == [0, 2.5, 2.5, 2.5, 2.5, 3]
+    assert list(tracked([1, 2])) == [1, 2]
+
+
+def test_what_is_heard_of_the_report_is_its_work(monkeypatch):
+    """No page says that more than the whole of it is done."""
+    monkeypatch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"a picture"))
+    for page in PAGES:
+        heard = []
+        page.made(heard.append)
+        assert min(heard) > -1e-9
+        assert sum(heard) == pytest.approx(page.work)
+
+
 def test_processes_take_turns_and_keep_the_order():
-    contents = made([Page(table2_by_metric, ()), Page(table2, (), slow=True)], 2)
+    contents = made([Page(table2_by_metric, ()), Page(table2, (), 9)], print, 2)
     titles = [each.files[0].splitlines()[0] for each in contents]
     assert titles == [
         "# Table 2 under the energy metric",

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -278,14 +278,7 @@ class Lobe(ABC):
 
     def starts(self) -> list[tuple[Distribution, Array]]:
         """Return distributions and the parameters of all half widths, for each γ of a grid."""
-        scan, mdf = self.scan, self.what.distribution
-        tangents = np.geomspace(scan.narrowest, scan.widest, scan.half_widths)
-        if not self.what.is_gamma_free or mdf.second_parameter is None:
-            return [(mdf, _parameters(mdf, tangents))]
-        ends = mdf.second_parameter.fit_range
-        gammas = np.geomspace(*ends, scan.gammas)
-        shapes = [mdf.with_gamma(float(np.clip(gamma, *ends))) for gamma in gammas]
-        return [(shape, _parameters(shape, tangents)) for shape in shapes]
+        return _starts(self.scan, self.what)
 
     def distribution(self, point: Array) -> Distribution:
         """Return the distribution with the γ of a point."""
@@ -421,10 +414,16 @@ class DirectionalLobe(Lobe):
 
     def __init__(self, samples: DirectionalSamples, *rest: Any) -> None:
         super().__init__(samples, *rest)
-        self._at = _Geometry(*_seen(samples, self.options.aperture))
+        self._at = _Geometry(samples, self.options.aperture)
         self._index = _check_fresnel(self.fresnel)
         self.linear = ("diffuse", *self._strengths())
         self._last: dict[tuple[Any, ...], Array] = {}
+
+    def with_fresnel(self, fresnel: str) -> Self:
+        """Return the lobe with another Fresnel factor."""
+        other = super().with_fresnel(fresnel)
+        other._at, other._last = self._at, self._last
+        return other
 
     def _strengths(self) -> tuple[str, ...]:
         """Return the names of the coefficients that carry the strength of the lobe."""
@@ -495,7 +494,8 @@ class DirectionalLobe(Lobe):
         if self.options.masking == "v-cavity":
             lobe *= at.v_cavity
         elif self.options.masking == "smith":
-            total = mdf.smith_lambda(at.incident_tangent, parameter)[at.incident_of]
+            incident, whose = at.incident_tangents
+            total = mdf.smith_lambda(incident, parameter)[whose]
             total += mdf.smith_lambda(at.outgoing_tangent, parameter)
             total += 1
             lobe /= total
@@ -543,18 +543,48 @@ def tangent(vectors: Array) -> Array:
 
 
 class _Geometry:
-    """What lobes need of pairs of directions."""
+    """What lobes need of pairs of directions, of each what is asked for."""
 
-    def __init__(self, incident: Array, outgoing: Array) -> None:
-        half = half_vector(incident, outgoing)
-        self.beta = polar_angle(half)
-        self.difference_cosine = np.clip(dot(incident, half), 0, 1)
-        self.schlick = np.power(1 - self.difference_cosine, 5)
-        self.denominator = 4 * incident[:, 2] * outgoing[:, 2]
-        self.v_cavity = v_cavity(incident, outgoing, half)
-        # A scan has many samples at a few angles of incidence.
-        self.incident_tangent, self.incident_of = np.unique(tangent(incident), return_inverse=True)
-        self.outgoing_tangent = tangent(outgoing)
+    def __init__(self, samples: DirectionalSamples, aperture: float | None) -> None:
+        self._samples, self._aperture = samples, aperture
+
+    @cached_property
+    def _directions(self) -> tuple[Array, Array]:
+        return _seen(self._samples, self._aperture)
+
+    @cached_property
+    def _half(self) -> Array:
+        return half_vector(*self._directions)
+
+    @cached_property
+    def beta(self) -> Array:
+        return polar_angle(self._half)
+
+    @cached_property
+    def difference_cosine(self) -> Array:
+        return np.clip(dot(self._directions[0], self._half), 0, 1)
+
+    @cached_property
+    def schlick(self) -> Array:
+        return np.power(1 - self.difference_cosine, 5)
+
+    @cached_property
+    def denominator(self) -> Array:
+        incident, outgoing = self._directions
+        return 4 * incident[:, 2] * outgoing[:, 2]
+
+    @cached_property
+    def v_cavity(self) -> Array:
+        return v_cavity(*self._directions, self._half)
+
+    @cached_property
+    def incident_tangents(self) -> tuple[Array, Indices]:
+        """The tangents of the angles of incidence, of which a scan has few, and whose they are."""
+        return np.unique(tangent(self._directions[0]), return_inverse=True)
+
+    @cached_property
+    def outgoing_tangent(self) -> Array:
+        return tangent(self._directions[1])
 
 
 def _seen(samples: DirectionalSamples, aperture: float | None) -> tuple[Array, Array]:
@@ -586,6 +616,19 @@ def lobe_at(samples: Measurements, what: LobeShape, options: BrdfModel, fresnel:
 def foreshortening(beta: Array, quantity: str) -> Array:
     """Return cos²β for a BRDF at θ_d = 0, where it is D̄/cos²β but for masking; else 1."""
     return np.square(np.cos(beta)) if quantity == "brdf" else np.ones_like(beta)
+
+
+@lru_cache(maxsize=64)
+def _starts(scan: Scan, what: LobeShape) -> list[tuple[Distribution, Array]]:
+    """Return what a candidate's scan begins with: the same for all samples."""
+    mdf = what.distribution
+    tangents = np.geomspace(scan.narrowest, scan.widest, scan.half_widths)
+    if not what.is_gamma_free or mdf.second_parameter is None:
+        return [(mdf, _parameters(mdf, tangents))]
+    ends = mdf.second_parameter.fit_range
+    gammas = np.geomspace(*ends, scan.gammas)
+    shapes = [mdf.with_gamma(float(np.clip(gamma, *ends))) for gamma in gammas]
+    return [(shape, _parameters(shape, tangents)) for shape in shapes]
 
 
 def _parameters(target: Distribution, tangents: Array) -> Array:

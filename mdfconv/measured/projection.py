@@ -9,6 +9,7 @@ sums run along contiguous memory.
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -19,28 +20,27 @@ from mdfconv.distributions.evaluation import Array
 
 # Linear steps: at the right parameter six are exact under 50 % of noise.
 _STEPS = 12
-_TOLERANCE = 1e-9
+# A step of this size, relatively, leaves far less than its size.
+_TOLERANCE = 1e-6
 # Of the smallest value: a model is kept positive, far from where a fit ends.
 _SMALLEST_MODEL = 1e-3
 
 
 @dataclass(frozen=True)
 class Transform:
-    """What a loss compares instead of values: `value` of them, and its `slope`."""
+    """What a loss compares instead of values: `value` of them, and its `slope` by both."""
 
     value: Callable[[Array], Array]
-    slope: Callable[[Array], Array]
+    slope: Callable[[Array, Array], Array]
 
 
-LOGARITHM = Transform(np.log, np.reciprocal)
+LOGARITHM = Transform(np.log, lambda value, _: 1 / value)
 
 
 def cube_root(factor: Array) -> Transform:
     """Return the cube root of values times a factor, shape (n,)."""
     root = np.cbrt(factor)
-    return Transform(
-        lambda value: root * np.cbrt(value), lambda value: root / (3 * np.square(np.cbrt(value)))
-    )
+    return Transform(lambda value: root * np.cbrt(value), lambda value, shown: shown / (3 * value))
 
 
 class Terms(NamedTuple):
@@ -51,9 +51,10 @@ class Terms(NamedTuple):
 
     def at(self, coefficients: Array) -> Array:
         """Return the model, shape (..., channels, n), of coefficients (..., channels, k)."""
-        value = self.fixed[..., None, :]
-        for place in range(self.basis.shape[-2]):
-            value = value + coefficients[..., place, None] * self.basis[..., None, place, :]
+        value = coefficients[..., 0, None] * self.basis[..., None, 0, :]
+        value += self.fixed[..., None, :]
+        for place in range(1, self.basis.shape[-2]):
+            value += coefficients[..., place, None] * self.basis[..., None, place, :]
         return value
 
 
@@ -79,6 +80,12 @@ class Projection:
             self._wanted = transform.value(values)
             self._smallest = _SMALLEST_MODEL * values.min(axis=-1, keepdims=True)
 
+    def weighted(self, weight: Array) -> Projection:
+        """Return the projection with other weights."""
+        other = copy(self)
+        other._weight, other._root = weight, np.sqrt(weight)
+        return other
+
     def __call__(
         self, terms: Terms, start: Array | None = None, *, steps: int = _STEPS
     ) -> Projected:
@@ -96,27 +103,35 @@ class Projection:
             residual *= self._root
             return Projected(coefficients, residual, np.broadcast_to(self._root, values.shape))
         if start is None:
-            weight = self._weight * np.square(transform.slope(values))
+            weight = self._weight * np.square(transform.slope(values, self._wanted))
             start = nonnegative(terms, values, weight)
         coefficients = start
+        near, shown, gain = self._transformed(terms, coefficients, transform)
         for _ in range(steps):
-            near = np.maximum(terms.at(coefficients), self._smallest)
-            gain = transform.slope(near)
             # One Gauss-Newton step for the transformed values is a weighted linear fit.
-            working = self._wanted - transform.value(near)
+            working = self._wanted - shown
             working /= gain
             working += near
             gain *= gain
             gain *= self._weight
             before, coefficients = coefficients, nonnegative(terms, working, gain)
+            near, shown, gain = self._transformed(terms, coefficients, transform)
             change = np.abs(coefficients - before)
             if not (change > _TOLERANCE * np.abs(coefficients)).any():
                 break
-        near = np.maximum(terms.at(coefficients), self._smallest)
-        residual = transform.value(near)
-        residual -= self._wanted
-        residual *= self._root
-        return Projected(coefficients, residual, self._root * transform.slope(near))
+        shown -= self._wanted
+        shown *= self._root
+        gain *= self._root
+        return Projected(coefficients, shown, gain)
+
+    def _transformed(
+        self, terms: Terms, coefficients: Array, transform: Transform
+    ) -> tuple[Array, Array, Array]:
+        """Return a model, what the loss compares instead, and the slope of that."""
+        near = terms.at(coefficients)
+        np.maximum(near, self._smallest, out=near)
+        shown = transform.value(near)
+        return near, shown, transform.slope(near, shown)
 
 
 def nonnegative(terms: Terms, values: Array, weight: Array) -> Array:

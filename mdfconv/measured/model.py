@@ -21,7 +21,7 @@ from mdfconv.distributions import Distribution, distribution, one_parameter_dist
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.projection import LOGARITHM, Terms, Transform, cube_root
+from mdfconv.measured.projection import CUBE_ROOT, LOGARITHM, Terms, Transform
 from mdfconv.measured.samples import DirectionalSamples, Measurements, Samples
 from mdfconv.registry import unknown_name
 
@@ -464,13 +464,16 @@ class DirectionalLobe(Lobe):
             return None
         if self.options.loss == "log":
             return LOGARITHM
-        return cube_root(self.samples.outgoing[:, 2]) if self.options.loss == "cube-root" else None
+        return CUBE_ROOT if self.options.loss == "cube-root" else None
 
     def weight(self) -> Array:
         """Return the weights."""
         deviations = self.deviations()
         if deviations is not None:
             return 1 / np.square(deviations.T)
+        if self.options.loss == "cube-root":
+            # The cube root of the cosine, squared.
+            return np.cbrt(np.square(self.samples.outgoing[:, 2]))
         if self.options.loss == "cosine":
             return np.square(self.samples.incident[:, 2] * self.samples.outgoing[:, 2])
         return np.ones(len(self.samples.values))

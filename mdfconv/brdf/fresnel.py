@@ -128,6 +128,23 @@ def normal_reflectance(ior: float) -> float:
     return ((check_index(ior) - 1) / (ior + 1)) ** 2
 
 
+def dielectric_index(reflectance: ArrayLike) -> Array:
+    """Return n ≥ 1 of a dielectric, the inverse of `normal_reflectance`.
+
+    Parameters
+    ----------
+    reflectance : array_like
+        F₀, [0, 1).
+
+    Returns
+    -------
+    numpy.ndarray
+        n₂/n₁ = (1 + √F₀)/(1 − √F₀), in the shape of `reflectance`.
+    """
+    root = np.sqrt(np.asarray(reflectance, float))
+    return np.asarray((1 + root) / (1 - root))
+
+
 def schlick_fresnel(
     cosine: Array | float, normal_reflectance: Array | float = NORMAL_REFLECTANCE
 ) -> Array | float:

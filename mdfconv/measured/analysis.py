@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.brdf_fit import MeasuredFit, fit_distribution, refitted
+from mdfconv.measured.brdf_fit import MeasuredFit, fit_distribution, refitted, refitted_as
 from mdfconv.measured.checks import Check, Verdict, checks_of, verdict_of
 from mdfconv.measured.model import (
     AUTO,
@@ -156,7 +157,7 @@ class ChannelFits:
             return None
         options = replace(fit.options, fresnel=fit.fresnel, free_specular=True)
         try:
-            return fit_distribution(_some(self.samples), fit.what, options)
+            return refitted_as(_some(self.samples), fit, options, fit.fresnel)
         except MdfconvError:
             return None
 
@@ -398,32 +399,34 @@ def _choices(result: ChannelFits) -> list[Choice]:
     """Return the recommended fit under other options, on some of the samples if there are many."""
     fit, samples = result.recommended, _some(result.samples)
     options = replace(fit.options, fresnel=fit.fresnel or AUTO)
-    trials: list[tuple[str, Measurements, LobeShape, dict[str, Any]]] = []
+    trials: list[tuple[str, Measurements, dict[str, Any]]] = []
     if isinstance(samples, Samples):
         other = "linear" if options.loss == "log" else "log"
-        trials.append((f"{other} loss", samples, fit.what, {"loss": other}))
+        trials.append((f"{other} loss", samples, {"loss": other}))
     else:
         for loss in ("log", "cube-root", "cosine"):
             if loss != options.loss:
-                trials.append((f"{loss} loss", samples, fit.what, {"loss": loss}))
+                trials.append((f"{loss} loss", samples, {"loss": loss}))
         near = np.minimum(samples.incident[:, 2], samples.outgoing[:, 2])
         inner = samples.select(near >= np.cos(np.radians(_NARROW_LIMIT)))
-        trials.append((f"angles up to {_NARROW_LIMIT:g}°", inner, fit.what, {}))
+        trials.append((f"angles up to {_NARROW_LIMIT:g}°", inner, {}))
         kinds = {DIELECTRIC: METAL, METAL: DIELECTRIC}
         if fit.fresnel in kinds:
             other = kinds[fit.fresnel]
-            trials.append((f"F of a {other}", samples, fit.what, {"fresnel": other}))
-    double = candidate(TWO_LOBES)
-    if fit.what.is_double:
-        trials.append(("one lobe", samples, candidate(double.distribution), {}))
-    elif fit.distribution == double.distribution:
-        trials.append(("two lobes", samples, double, {}))
+            trials.append((f"F of a {other}", samples, {"fresnel": other}))
     choices = [Choice("k_s free", result.freed)] if result.freed else []
-    for label, some, what, changes in trials:
-        try:
-            choices.append(Choice(label, fit_distribution(some, what, replace(options, **changes))))
-        except MdfconvError:
-            continue
+    for label, some, changes in trials:
+        changed = replace(options, **changes)
+        fresnel = fit.fresnel and changed.fresnel
+        with suppress(MdfconvError):
+            choices.append(Choice(label, refitted_as(some, fit, changed, fresnel)))
+    double = candidate(TWO_LOBES)
+    shapes = {"one lobe": candidate(double.distribution)} if fit.what.is_double else {}
+    if not shapes and fit.distribution == double.distribution:
+        shapes = {"two lobes": double}
+    for label, what in shapes.items():
+        with suppress(MdfconvError):
+            choices.append(Choice(label, fit_distribution(samples, what, options)))
     return choices
 
 

@@ -2,12 +2,16 @@
 
 What is linear is solved for (`mdfconv.measured.projection`), the lobe's parameters are searched:
 a scan finds starts on some of the samples, Levenberg and Marquardt's method the minimum near each
-on more of them, and a few steps that of all.
+on more of them, and a few steps that of all. The search learns from its steps what the squares of
+slopes leave out of the Hessian, which is much for a shape that does not fit.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import compress
 from typing import Any
 
@@ -52,6 +56,8 @@ _AT_END = 1e-3
 _LARGEST_DEVIATION = 2.0
 # Robust weights are those of a point when it moves less than this.
 _SETTLED = 1e-4
+# Of what is moved again.
+_NEARLY_SETTLED = 1e-3
 # The largest value of no surface is less.
 _LEAST_BRDF = 1e-30
 # Of an exact fit, whose logarithm is wanted.
@@ -62,6 +68,8 @@ _SMALLEST_LOGARITHM = 1e-100
 _DEVIATIONS = (1e-100, 1e100)
 _STEPS, _FIRST_STEPS, _POLISHING_STEPS = 60, 8, 4
 _SMALLEST_STEP = 1e-6
+# Steps that lessen the cost by no more, relatively, are not felt.
+_LEAST_GAIN = 1e-10
 _DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-4, 1e-12, 1e8
 # Of the choice of samples: the same fit each time.
 _SEED = 0
@@ -248,14 +256,17 @@ class MeasuredFit:
     def model(self, samples: Measurements) -> Array:
         """Return the model at the angles or directions of samples, shape (n, channels)."""
         lobe = lobe_at(samples, self.what, self.options, self.fresnel or "none")
-        coefficients = np.array([self._coefficient(name) for name in lobe.linear]).T
-        return lobe.terms(self.point).at(coefficients).T
+        return lobe.terms(self.point).at(self.coefficients(lobe.linear)).T
 
     def _coefficient(self, name: str) -> tuple[float, ...]:
         if name in ("specular_f0", "specular_rest"):
             f0, specular = np.array(self.linear["f0"]), np.array(self.linear["specular"])
             return tuple((specular * (f0 if name == "specular_f0" else 1 - f0)).tolist())
         return self.linear[name]
+
+    def coefficients(self, names: Sequence[str]) -> Array:
+        """Return what was solved for as the coefficients of a lobe, shape (channels, names)."""
+        return np.array([self._coefficient(name) for name in names]).T
 
     def albedo(self, theta: float) -> Array:
         """Return the share of light from an angle, radians, that is reflected, shape (channels,).
@@ -342,14 +353,14 @@ def fit_distribution(
     starts = [few.extended(start) for start in few.starts()]
     start = starts[0]
     if len(starts) > 1:
-        start = min(
-            (few.descend(start, steps=_FIRST_STEPS) for start in starts), key=lambda m: m.cost
-        ).point
+        tried = (few.evaluated(start).descend(steps=_FIRST_STEPS) for start in starts)
+        start = min(tried, key=lambda minimum: minimum.cost).point
     minima = []
     for kind in kinds:
         problem = some.with_fresnel(kind)
         # The shape has been searched; the rest is the problem's own.
-        minimum = problem.descend(problem.extended(start[: few.lobe.shape_size]))
+        minimum = problem.evaluated(problem.extended(start[: few.lobe.shape_size]))
+        minimum = minimum.descend(smallest=_NEARLY_SETTLED)
         minima.append(_robust(minimum, passes=_FIRST_PASSES))
     plausible = [minimum for minimum in minima if minimum.is_plausible] or minima
     found = min(plausible, key=lambda minimum: minimum.bic(first.count))
@@ -357,21 +368,50 @@ def fit_distribution(
         found = _robust(found, passes=_ROBUST_PASSES)
     if some is not first:
         whole = first.with_fresnel(found.problem.lobe.fresnel)
-        found = _robust(whole.evaluated(found.point), passes=_LAST_PASSES)
+        found = _polished(whole, found.report())
     return found.report()
 
 
 def refitted(samples: Measurements, fit: MeasuredFit) -> MeasuredFit:
     """Return the fit to more samples of the same surface, near which it is."""
     problem = Problem(lobe_at(samples, fit.what, fit.options, fit.fresnel or LOSSLESS))
-    return _robust(problem.evaluated(fit.point), passes=_LAST_PASSES).report()
+    return _polished(problem, fit).report()
 
 
-def _robust(minimum: Minimum, passes: int) -> Minimum:
+def refitted_as(
+    samples: Measurements,
+    fit: MeasuredFit,
+    options: BrdfModel,
+    fresnel: str | None,
+    what: LobeShape | None = None,
+) -> MeasuredFit:
+    """Return the fit of the same lobe to other samples, or under other options, nearby.
+
+    Raises `MdfconvError` as `fit_distribution`.
+    """
+    lobe = checked(lobe_at(samples, what or fit.what, options, fresnel or LOSSLESS))
+    known = fit.parameters
+    point = [u.coordinate(known.get(u.name, _STARTING_INDEX)) for u in lobe.unknowns]
+    minimum = Problem(lobe).evaluated(np.array(point)).descend(smallest=_NEARLY_SETTLED)
+    found = _robust(_robust(minimum, passes=_FIRST_PASSES), passes=_ROBUST_PASSES)
+    if found.is_flat:
+        raise MdfconvError(*lobe.refusal)
+    return found.report()
+
+
+def _polished(problem: Problem, fit: MeasuredFit) -> Minimum:
+    """Return the minimum near a fit to some of the samples of a problem."""
+    return _robust(problem.at(fit), passes=_LAST_PASSES, smallest=_NEARLY_SETTLED)
+
+
+def _robust(minimum: Minimum, passes: int, smallest: float = _SETTLED) -> Minimum:
     """Return the minimum near a point with weights for which it is the robust one."""
-    for _ in range(passes if minimum.problem.lobe.options.robust else 1):
+    is_robust = minimum.problem.lobe.options.robust
+    for _ in range(passes if is_robust else 1):
         before = minimum.point
-        minimum = minimum.problem.reweighted(minimum).descend(before, steps=_POLISHING_STEPS)
+        minimum = minimum.reweighted().descend(
+            steps=_POLISHING_STEPS, smallest=smallest if is_robust else _SMALLEST_STEP
+        )
         if np.abs(minimum.point - before).max() < _SETTLED:
             break
     return minimum
@@ -430,7 +470,7 @@ class Problem:
         self.robust = np.ones(values.shape[1]) if robust is None else robust
         self._transform = lobe.transform()
         weight = lobe.weight() * self.robust
-        self._project = Projection(self._values, weight, self._transform)
+        self.project = Projection(self._values, weight, self._transform)
 
     @property
     def count(self) -> int:
@@ -449,35 +489,40 @@ class Problem:
             return self
         return Problem(self.lobe.with_fresnel(fresnel), self.robust, self.unit)
 
-    def reweighted(self, minimum: Minimum) -> Problem:
-        """Return the problem in which what is far off at a point counts less."""
-        if not self.lobe.options.robust:
-            return self
-        residual = np.abs(minimum.projected.residual).max(axis=0) / np.sqrt(minimum.problem.robust)
-        spread = MEDIANS * float(np.median(residual)) or 1.0
-        weights = np.minimum(1, _HUBER * spread / np.maximum(residual, 1e-300))
-        return Problem(self.lobe, weights, self.unit)
+    def weighted(self, robust: Array) -> Problem:
+        """Return the problem with other robust weights."""
+        other = copy(self)
+        other.robust = robust
+        other.project = self.project.weighted(self.lobe.weight() * robust)
+        return other
 
     def starts(self) -> list[Array]:
-        """Return the best point of each γ of a grid, the best ones first; raise if none is."""
+        """Return the best points of γ that are better than their neighbours, the best ones first.
+
+        Raises `MdfconvError` if there is none.
+        """
         lobe = self.lobe
-        found: list[tuple[float, Array]] = []
+        points: list[Array] = []
+        least: list[float] = []
         for mdf, parameters in lobe.starts():
             if lobe.what.is_double:
                 parameters = parameters[:: max(1, len(parameters) // _DOUBLE_WIDTHS)]
-            terms, points = lobe.scanned(mdf, parameters), np.log(parameters)[:, None]
+            terms, tried = lobe.scanned(mdf, parameters), np.log(parameters)[:, None]
             if lobe.what.is_double:
-                terms, points = _mixtures(terms, points[:, 0])
+                terms, tried = _mixtures(terms, tried[:, 0])
             elif lobe.what.is_gamma_free:
-                points = np.hstack([points, np.full_like(points, np.log(mdf.gamma))])
+                tried = np.hstack([tried, np.full_like(tried, np.log(mdf.gamma))])
             costs, strengths = self._scanned(terms)
             best = int(np.argmin(costs))
-            if strengths[best]:
-                found.append((float(costs[best]), points[best]))
-        if not found:
+            points.append(tried[best])
+            least.append(float(costs[best]) if strengths[best] else np.inf)
+        if min(least) == np.inf:
             raise MdfconvError(*lobe.refusal)
-        found.sort(key=lambda start: start[0])
-        return [point for _, point in found[: lobe.scan.starts]]
+        # A start that is worse than that of the next γ leads to the same minimum.
+        around = np.array([np.inf, *least, np.inf])
+        is_valley = np.array(least) <= np.minimum(around[:-2], around[2:])
+        order = [place for place in np.argsort(least, kind="stable") if is_valley[place]]
+        return [points[place] for place in order[: lobe.scan.starts]]
 
     def _scanned(self, terms: Terms) -> tuple[Array, Array]:
         """Return the costs of many lobes, and whether any channel has them."""
@@ -485,7 +530,7 @@ class Problem:
         size = max(1, _SCANNED_AT_ONCE // self._values.size)
         for start in range(0, len(terms.basis), size):
             block = Terms(*(part[start : start + size] for part in terms))
-            projected = self._project(block, steps=_SCAN_STEPS)
+            projected = self.project(block, steps=_SCAN_STEPS)
             costs.append(np.square(projected.residual).sum(axis=(1, 2)))
             strengths.append((projected.coefficients[..., 1] > 0).any(axis=1))
         return np.concatenate(costs), np.concatenate(strengths)
@@ -495,49 +540,17 @@ class Problem:
         rest = self.lobe.unknowns[len(start) :]
         return np.array([*start, *(unknown.coordinate(_STARTING_INDEX) for unknown in rest)])
 
-    def evaluated(self, point: Array, coefficients: Array | None = None) -> Minimum:
-        """Return what is known at a point; `coefficients` are near the best ones."""
-        terms = self.lobe.terms(point)
-        steps = {} if coefficients is None else {"steps": _WARM_STEPS}
-        return Minimum(self, point, terms, self._project(terms, coefficients, **steps))
-
-    def at(self, point: Array, coefficients: Array) -> Minimum:
-        """Return what coefficients make of a point."""
-        terms = self.lobe.terms(point)
-        return Minimum(self, point, terms, self._project(terms, coefficients, steps=0))
-
-    def descend(
-        self, start: Array, *, steps: int = _STEPS, smallest: float = _SMALLEST_STEP
-    ) -> Minimum:
-        """Return the minimum near a point (Levenberg 1944, Marquardt 1963)."""
+    def evaluated(self, point: Array) -> Minimum:
+        """Return what is known at a point, moved inside the bounds."""
         low, high = self.lobe.bounds
-        now = self.evaluated(np.clip(start, low + _INSIDE, high - _INSIDE))
-        damping = _DAMPING
-        for _ in range(steps):
-            slopes = self.lobe.slopes(now.point, now.terms)
-            jacobian = projection.projected_slope(now.terms, slopes, now.projected)
-            normal = np.einsum("in,jn->ij", jacobian, jacobian)
-            right = np.einsum("in,n->i", jacobian, now.projected.residual.ravel())
-            # At an end of its range a coordinate may only come back.
-            held = ((now.point <= low) & (right > 0)) | ((now.point >= high) & (right < 0))
-            free = np.flatnonzero(~held & (np.diagonal(normal) > 0))
-            following = now
-            while free.size and damping < _LARGEST_DAMPING:
-                matrix = normal[np.ix_(free, free)]
-                matrix = matrix + damping * np.diag(np.diagonal(matrix))
-                point = now.point.copy()
-                point[free] -= np.linalg.solve(matrix, right[free])
-                following = self.evaluated(np.clip(point, low, high), now.projected.coefficients)
-                if following.cost <= now.cost:
-                    damping = max(damping / 10, _LEAST_DAMPING)
-                    break
-                following = now
-                damping *= 10
-            step = np.abs(following.point - now.point).max(initial=0.0)
-            now = following
-            if step < smallest:
-                break
-        return now
+        point = np.clip(point, low + _INSIDE, high - _INSIDE)
+        terms = self.lobe.terms(point)
+        return Minimum(self, point, terms, self.project(terms))
+
+    def at(self, fit: MeasuredFit) -> Minimum:
+        """Return what a fit to other samples makes of these."""
+        terms, known = self.lobe.terms(fit.point), fit.coefficients(self.lobe.linear) / self.unit
+        return Minimum(self, fit.point, terms, self.project(terms, known, steps=0))
 
 
 def _mixtures(terms: Terms, coordinates: Array) -> tuple[Terms, Array]:
@@ -555,9 +568,128 @@ def _mixtures(terms: Terms, coordinates: Array) -> tuple[Terms, Array]:
 class Minimum:
     """A point of a problem, and the best coefficients there."""
 
-    def __init__(self, problem: Problem, point: Array, terms: Terms, projected: Projected) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        point: Array,
+        terms: Terms,
+        projected: Projected,
+        curvature: Array | None = None,
+    ) -> None:
         self.problem, self.point, self.terms, self.projected = problem, point, terms, projected
-        self.cost = float(np.square(projected.residual).sum())
+        self._curvature = np.zeros((len(point),) * 2) if curvature is None else curvature
+        residual = projected.residual.ravel()
+        self.cost = float(residual @ residual)
+
+    @cached_property
+    def _slopes(self) -> list[Terms]:
+        """∂terms/∂coordinate."""
+        return self.problem.lobe.slopes(self.point, self.terms)
+
+    @cached_property
+    def _jacobian(self) -> Array:
+        """∂residual/∂coordinate with the linear part projected out."""
+        return projection.projected_slope(self.terms, self._slopes, self.projected)
+
+    @cached_property
+    def _normal(self) -> Array:
+        return np.einsum("in,jn->ij", self._jacobian, self._jacobian)
+
+    @cached_property
+    def _gradient(self) -> Array:
+        return np.einsum("in,n->i", self._jacobian, self.projected.residual.ravel())
+
+    def _learn(self, before: Minimum) -> None:
+        """Learn from a step what JᵀJ leaves out of the Hessian (Dennis, Gay & Welsch 1981)."""
+        step, change = self.point - before.point, self._gradient - before._gradient
+        along = change @ step
+        if not along > 0:
+            return
+        residual = self.projected.residual.ravel()
+        wanted = self._gradient - np.einsum("in,n->i", before._jacobian, residual)
+        known = before._curvature
+        size = abs(step @ known @ step)
+        known = known * min(1, abs(step @ wanted) / size) if size else known
+        missing = wanted - known @ step
+        # Before they are multiplied: residuals have any unit.
+        share = change / along
+        outer = np.outer(missing, share)
+        square = (missing @ step) * np.outer(share, share)
+        self._curvature = known + outer + outer.T - square
+
+    def moved(self, point: Array) -> Minimum:
+        """Return another point, whose best coefficients are near."""
+        terms = self.problem.lobe.terms(point)
+        projected = self.problem.project(terms, self.projected.coefficients, steps=_WARM_STEPS)
+        return Minimum(self.problem, point, terms, projected, self._curvature)
+
+    def weighted(self, robust: Array) -> Minimum:
+        """Return the point in the problem with other robust weights, on which no slope depends."""
+        problem, known = self.problem.weighted(robust), self.projected.coefficients
+        projected = problem.project(self.terms, known, steps=_WARM_STEPS)
+        other = Minimum(problem, self.point, self.terms, projected, self._curvature)
+        other._slopes = self._slopes
+        return other
+
+    def error_at(self, robust: Array) -> float:
+        """Return the error of the same coefficients with other robust weights."""
+        problem, known = self.problem.weighted(robust), self.projected.coefficients
+        return Minimum(
+            problem, self.point, self.terms, problem.project(self.terms, known, steps=0)
+        ).error
+
+    def reweighted(self) -> Minimum:
+        """Return the point in the problem in which what is far off there counts less."""
+        if not self.problem.lobe.options.robust:
+            return self
+        residual = np.abs(self.projected.residual).max(axis=0) / np.sqrt(self.problem.robust)
+        spread = MEDIANS * float(np.median(residual)) or 1.0
+        return self.weighted(np.minimum(1, _HUBER * spread / np.maximum(residual, 1e-300)))
+
+    def descend(self, *, steps: int = _STEPS, smallest: float = _SMALLEST_STEP) -> Minimum:
+        """Return the minimum nearby (Levenberg 1944, Marquardt 1963)."""
+        now, damping = self, _DAMPING
+        for _ in range(steps):
+            following, damping, is_last = now._step(damping, smallest)
+            if is_last:
+                return following
+            following._learn(now)
+            now = following
+        return now
+
+    def _step(self, damping: float, smallest: float) -> tuple[Minimum, float, bool]:
+        """Return a better point, the damping for the next step, and whether that is not worth it.
+
+        Where what was learnt of the Hessian misleads, JᵀJ stands for it.
+        """
+        low, high = self.problem.lobe.bounds
+        normal, right = self._normal, self._gradient
+        # At an end of its range a coordinate may only come back.
+        held = ((self.point <= low) & (right > 0)) | ((self.point >= high) & (right < 0))
+        free = np.flatnonzero(~held & (np.diagonal(normal) > 0))
+        block = np.ix_(free, free)
+        trials = [normal[block]]
+        curved = (normal + self._curvature)[block]
+        if self._curvature.any() and np.linalg.eigvalsh(curved).min(initial=np.inf) > 0:
+            trials.append(curved)
+        while free.size and damping < _LARGEST_DAMPING:
+            matrix = trials[-1] + damping * np.diag(np.diagonal(trials[-1]))
+            point = self.point.copy()
+            point[free] -= np.linalg.solve(matrix, right[free])
+            point = np.clip(point, low, high)
+            gain = right @ (self.point - point)
+            is_last = np.abs(point - self.point).max() < smallest
+            is_last |= 0 <= gain < _LEAST_GAIN * self.cost
+            following = self.moved(point)
+            if following.cost <= self.cost:
+                return following, max(damping / 10, _LEAST_DAMPING), is_last
+            if is_last:
+                break
+            if len(trials) > 1:
+                trials.pop()
+            else:
+                damping *= 10
+        return self, damping, True
 
     @property
     def relative_error(self) -> float:
@@ -570,6 +702,11 @@ class Minimum:
         """The same in the loss's units."""
         is_relative = self.problem.lobe.transform() is not None
         return self.relative_error * (1 if is_relative else self.problem.unit)
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether no channel has a lobe."""
+        return not (self.problem.lobe.is_absolute or self.projected.coefficients[:, 1:].any())
 
     @property
     def is_plausible(self) -> bool:
@@ -607,7 +744,7 @@ class Minimum:
         if not self.problem.lobe.what.is_double or self.point[0] <= self.point[1]:
             return self
         first, second, share, *rest = self.point
-        return self.problem.evaluated(np.array([second, first, 1 - share, *rest]))
+        return self.moved(np.array([second, first, 1 - share, *rest]))
 
     def report(self) -> MeasuredFit:
         """Return the fit."""
@@ -656,8 +793,7 @@ class Minimum:
         Residuals of a scan resemble their neighbours: fewer of them are independent.
         """
         lobe = self.problem.lobe
-        slopes = lobe.slopes(self.point, self.terms)
-        matrix = projection.information(self.terms, slopes, self.projected)
+        matrix = projection.information(self.terms, self._slopes, self.projected)
         size = np.sqrt(np.maximum(np.diagonal(matrix), np.finfo(float).tiny))
         inverse = np.linalg.pinv(matrix / (size[:, None] * size), hermitian=True)
         residual = self.projected.residual

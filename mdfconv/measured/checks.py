@@ -14,10 +14,12 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from mdfconv.brdf.fresnel import dielectric_index
 from mdfconv.brdf.microfacet import dot, mirrored, polar_angle
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.measured.samples import DirectionalSamples, Measurements
 from mdfconv.measured.scans import brightness, incidence_groups, median
+from mdfconv.output.records import percent
 
 if TYPE_CHECKING:
     from mdfconv.measured.brdf_fit import MeasuredFit
@@ -167,13 +169,13 @@ def verdict_of(
         reasons.append(failed.get("incidences", ""))
     if error > _GOOD and misfit < 0.5 * error:
         reasons.append(
-            f"Much of it is noise of dark samples; without it the error is {_percent(misfit)}."
+            f"Much of it is noise of dark samples; without it the error is {percent(misfit)}."
         )
     if misfit > _WORTH_A_WORD:
         reasons.append(_where_it_fails(samples, square))
     typical = median(noise)
-    size = f"an RMS error of {_percent(error)} ({len(samples.values)} samples"
-    size += f", noise {_percent(typical)})" if np.isfinite(typical) else ")"
+    size = f"an RMS error of {percent(error)} ({len(samples.values)} samples"
+    size += f", noise {percent(typical)})" if np.isfinite(typical) else ")"
     lobe, is_single = _described(fit), fit.second is None
     impossible = failed.get("energy", "") if "energy" in failed and _is_impossible(fit) else ""
     if impossible:
@@ -208,16 +210,6 @@ def _misfit(samples: Measurements, log_ratio: Array, noise: Array, weights: Arra
     if median(noise[bright >= median(bright)]) <= _GOOD_NOISE:
         square = np.maximum(square - np.square(2 * noise), 0)
     return np.where(known, weights * square, 0)
-
-
-def _percent(share: float) -> str:
-    """Return a share in %, with two digits and of large ones all before the point."""
-    number = 100 * share
-    if 0 < number < 0.01:
-        return "less than 0.01 %"
-    if number > 1e4:
-        return "more than 10000 %"
-    return f"{number:.0f} %" if number >= 9.95 else f"{number:.2g} %"
 
 
 def _surface(fit: MeasuredFit) -> str:
@@ -264,10 +256,10 @@ def _two_lobes(fits: Sequence[MeasuredFit], fit: MeasuredFit, error: float) -> s
     if gain > 1 - _GAIN:
         return ""
     if fit.second is not None:
-        alone = _percent(error / max(gain, _LEAST_ERROR))
+        alone = percent(error / max(gain, _LEAST_ERROR))
         return f"The best single lobe, {single.label}, leaves {alone}."
     verb = "halve" if 0.4 <= gain <= 0.6 else "reduce"
-    text = f"{_described(double)} would {verb} the error to {_percent(gain * error)}."
+    text = f"{_described(double)} would {verb} the error to {percent(gain * error)}."
     return text[0].upper() + text[1:]
 
 
@@ -297,7 +289,7 @@ def _where_it_fails(samples: Measurements, square: Array) -> str:
             is_inside = (place <= index) == is_below
             # Not an outlier or two.
             if np.median(square[is_inside]) > np.median(square[~is_inside]):
-                best, size = split[index], _percent(np.sqrt(mean[index]))
+                best, size = split[index], percent(np.sqrt(mean[index]))
                 where = f"The misfit is largest {name.format(steps[index])}: {size}."
     return where
 
@@ -391,7 +383,7 @@ def _energy(fit: MeasuredFit, largest: float) -> Check:
     """
     whole = np.array([np.max(fit.albedo(np.radians(angle))) for angle in _ALBEDO_ANGLES])
     shares = ", ".join(
-        f"{_percent(share)} at {angle:g}°"
+        f"{percent(share)} at {angle:g}°"
         for share, angle in zip(whole, _ALBEDO_ANGLES, strict=True)
     )
     text = f"The surface reflects {shares}"
@@ -418,7 +410,7 @@ def _reflectance(fit: MeasuredFit, error: float) -> Check | None:
     if error > _USABLE:
         doubt = "the lobe does not fit, or its peak is not resolved"
     if fit.fresnel == "dielectric" or (strength < _MOST_DIELECTRIC and error <= _USABLE):
-        index = fit.n or (1 + np.sqrt(strength)) / (1 - np.sqrt(strength))
+        index = fit.n or float(dielectric_index(strength))
         text = f"{numbers} is that of a dielectric with n = {index:.3g}"
         passed = bool(least <= index <= largest)
         if not passed:
@@ -607,7 +599,7 @@ def _strength(fit: MeasuredFit, freed: MeasuredFit | None, error: float) -> Chec
     text = f"Freeing k_s (then {', '.join(f'{value:.2g}' for value in freed.specular)}) would "
     if gain > _NO_GAIN:
         return Check("strength", True, f"{text}gain nothing.")
-    text += f"reduce the error from {_percent(error)} to {_percent(gain * error)}"
+    text += f"reduce the error from {percent(error)} to {percent(gain * error)}"
     is_little = gain > 1 - _GAIN or error * np.sqrt(1 - gain**2) < _SMALL_GAIN
     if not is_little and np.allclose(freed.specular, np.pi, rtol=_NEAR_PI):
         text += ". k_s is near π: are these reflectance factors, π f_r?"
@@ -626,7 +618,7 @@ def _outliers(weights: Array, is_beyond_noise: NDArray[np.bool_]) -> Check:
     count = int(np.count_nonzero((weights < _OUTLYING) & is_beyond_noise))
     share = count / len(weights)
     text = (
-        f"{count} of {len(weights)} samples ({_percent(share)}) lie far from the fit and count less"
+        f"{count} of {len(weights)} samples ({percent(share)}) lie far from the fit and count less"
     )
     if share <= _MANY_OUTLIERS:
         return Check("outliers", True, f"{text}.")

@@ -13,10 +13,9 @@ from mdfconv.fitting.metrics.base import srgb
 from mdfconv.measured.analysis import Analysis, ChannelFits
 from mdfconv.measured.brdf_fit import MeasuredFit
 from mdfconv.measured.materials import Snippet, snippets
-from mdfconv.measured.model import BrdfModel
 from mdfconv.measured.panels import AnyPanel, panels, runner_up
 from mdfconv.measured.samples import DirectionalSamples, wavelengths_of
-from mdfconv.output.records import with_error
+from mdfconv.output.records import percent, with_error
 
 # Candidates that a reader compares.
 _MOST_CANDIDATES = 5
@@ -45,6 +44,8 @@ _LOSSES = {
     "cosine": "differences of f_r cos θ_i cos θ_o (Löw et al. 2012)",
     "cube-root": "differences of the cube root of f_r cos θ_o (Bieron & Peers 2020)",
 }
+# Of the error of a loss; that of others is in the unit of what they compare.
+_ERROR_UNITS = {"log": "%", "sigma": "σ"}
 _MASKINGS = {
     "smith": "Smith, height-correlated (Heitz 2014), for every distribution",
     "v-cavity": "V-cavity (Torrance & Sparrow 1967)",
@@ -115,7 +116,7 @@ def contents_of(analysis: Analysis, result: ChannelFits, command: str, digest: s
         precision=_precision(result),
         legend=_legend(result),
         plots=list(panels(result)),
-        candidates=_candidates(result, analysis.settings),
+        candidates=_candidates(result),
         why=_why(result),
         choices=_choices(result),
         spectrum=_spectrum(fit, channels),
@@ -143,7 +144,7 @@ def overview(articles: Sequence[Contents]) -> ReportTable:
                 roughness,
                 "" if roughness else own,
                 *rest,
-                percent(result.error),
+                percent(result.error, is_aligned=True),
             ]
         )
     columns = ["file", "verdict", "shape", "roughness", *_MAIN, "error"]
@@ -176,14 +177,6 @@ def _result_record(result: ChannelFits) -> dict[str, Any]:
         "unknowns": list(fit.unknowns),
         "correlation": np.asarray(fit.correlation).tolist(),
     }
-
-
-def percent(share: float, spread: float | None = None) -> str:
-    """Return a share in percent: two digits, or those that its error supports."""
-    if spread is not None:
-        return f"{with_error(100 * share, 100 * spread)} %"
-    number = 100 * share
-    return f"{number:.0f} %" if number >= 9.95 else f"{number:#.2g} %"
 
 
 def _kind(result: ChannelFits) -> str:
@@ -365,7 +358,7 @@ def _main(fit: MeasuredFit, channels: Sequence[str]) -> list[str]:
     ]
 
 
-def _candidates(result: ChannelFits, settings: BrdfModel) -> ReportTable:
+def _candidates(result: ChannelFits) -> ReportTable:
     """Return the candidates that come nearest, the recommended one among them."""
     fits = list(result.fits[:_MOST_CANDIDATES])
     if result.recommended not in fits:
@@ -373,9 +366,7 @@ def _candidates(result: ChannelFits, settings: BrdfModel) -> ReportTable:
     least = min(fit.bic for fit in fits)
     columns = ["shape", *_MAIN, "error", "validated error", "ΔBIC"]
     channels = result.samples.channels
-    unit = "%" if settings.loss == "log" else ""
-    if settings.deviations(result.samples) is not None:
-        unit = "σ"
+    unit = _ERROR_UNITS.get(result.recommended.loss, "")
     rows = [
         [
             fit.label,
@@ -392,7 +383,9 @@ def _candidates(result: ChannelFits, settings: BrdfModel) -> ReportTable:
 def _error(value: float, unit: str, spread: float | None = None) -> str:
     """Return an error of the loss: relative, in standard deviations of the values, or in theirs."""
     if unit == "%" and np.isfinite(value):
-        return percent(value, spread)
+        if spread is None:
+            return percent(value, is_aligned=True)
+        value, spread = 100 * value, 100 * spread
     return f"{with_error(value, spread)} {unit}".rstrip()
 
 
@@ -432,7 +425,7 @@ def _choices(result: ChannelFits) -> ReportTable:
     for choice in result.choices:
         cells = _main(choice.fit, channels)
         shape = choice.fit.label if several else ""
-        size = percent(choice.fit.log_rmse)
+        size = percent(choice.fit.log_rmse, is_aligned=True)
         rows.append([choice.what, shape, *(cells[place] for place in shown), size])
     columns = ["choice", "shape", *(_MAIN[place] for place in shown), "error of logarithms"]
     return _without_empty(ReportTable(columns, rows, 0 if rows else None))

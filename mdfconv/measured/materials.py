@@ -15,14 +15,21 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from mdfconv.brdf.fresnel import Fresnel, conductor, dielectric, schlick_fresnel
+from mdfconv.brdf.fresnel import (
+    Fresnel,
+    conductor,
+    dielectric,
+    dielectric_index,
+    schlick_fresnel,
+)
 from mdfconv.brdf.microfacet import MASKINGS, Microsurface, direction, dot, reflect
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
 from mdfconv.measured.brdf_fit import MeasuredFit
 from mdfconv.measured.samples import wavelengths_of
-from mdfconv.measured.substitutes import LobePair, Substitute, lobe_pair, percent, substitute
+from mdfconv.measured.substitutes import LobePair, Substitute, lobe_pair, substitute
+from mdfconv.output.records import percent
 
 # The form of a parameter that renderers store.
 _ROUGHNESS = "ggx:roughness"
@@ -169,7 +176,7 @@ class _Appearance:
     @property
     def index(self) -> float:
         """The index of refraction of a dielectric, of the mean of its channels."""
-        return float(_index(self.normal.mean()))
+        return float(dielectric_index(min(self.normal.mean(), _LARGEST_REFLECTANCE)))
 
     @property
     def fresnel(self) -> Fresnel:
@@ -275,12 +282,6 @@ def _albedo(
     return total
 
 
-def _index(reflectance: Array) -> Array:
-    """Return n of a dielectric of a reflectance along the normal."""
-    root = np.sqrt(np.minimum(reflectance, _LARGEST_REFLECTANCE))
-    return (1 + root) / (1 - root)
-
-
 def _colours(channels: Sequence[str]) -> tuple[Sequence[Sequence[int]], str]:
     """Return which channels make one, or red, green and blue, and what to know of that."""
     names = [channel.strip().lower() for channel in channels]
@@ -326,22 +327,23 @@ def _mitsuba(surface: _Appearance) -> _Form:
     weight = 1 - float(surface.diffuse.max()) if surface.has_diffuse else 1.0
     plugin = partial(_optics, surface, weight, has_principled=lobes[0][1].name == "ggx")
 
-    def specular(theta: float, gain: float) -> Array:
-        return weight * _albedo(theta, lobes, plugin(gain)[1], "separable")
+    def specular(theta: float, fresnel: Fresnel) -> Array:
+        return weight * _albedo(theta, lobes, fresnel, "separable")
 
-    gain, remarks = surface.gain(partial(specular, gain=1.0)), [remark]
+    optics, fresnel = plugin(1.0)
+    gain, remarks = surface.gain(partial(specular, fresnel=fresnel)), [remark]
     if gain != 1:
+        optics, fresnel = plugin(gain)
         remarks.append(
             f"Its specular part is scaled by {_number(gain)}, for Mitsuba's masking is separable "
             "or the lobe another: so its albedo is off to both sides."
         )
-    optics, _ = plugin(gain)
     parts = [optics(mdf.name, alpha) for _, mdf, alpha in lobes]
     element = parts[0] if len(parts) == 1 else _blend(1 - lobes[0][0], *parts)
     if surface.has_diffuse:
         base = _bsdf("diffuse", _colour("reflectance", surface.diffuse / (1 - weight)))
         element = _blend(weight, base, element)
-    return _xml(element), remarks, lambda theta: surface.diffuse + specular(theta, gain)
+    return _xml(element), remarks, lambda theta: surface.diffuse + specular(theta, fresnel)
 
 
 def _mitsuba_lobes(surface: _Appearance) -> tuple[list[_Lobe], str]:
@@ -405,7 +407,8 @@ def _optics(
         return partial(_rough, optics), partial(_constant, normal=normal)
     scale *= float(surface.averaged(surface.fit.specular).max())
     normal = surface.normal * (gain / (weight * scale))
-    eta, k, error = _index(normal), np.zeros_like(normal), 0.0
+    eta = dielectric_index(np.minimum(normal, _LARGEST_REFLECTANCE))
+    k, error = np.zeros_like(normal), 0.0
     if surface.is_metal:
         eta, k, error = _conductor_like(normal)
     if error > _NOTICED and has_principled:

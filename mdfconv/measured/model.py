@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -22,7 +22,7 @@ from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.distributions.parameter import percent_hint
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.projection import LOGARITHM, Terms, Transform, cube_root
+from mdfconv.measured.projection import CUBE_ROOT, LOGARITHM, Terms, Transform
 from mdfconv.measured.samples import DirectionalSamples, Measurements, Samples
 from mdfconv.registry import unknown_name
 
@@ -41,6 +41,8 @@ TWO_LOBES = "ggx+ggx"
 # radius of six points around the centre, and weights.
 _DISC_RADIUS = np.sqrt(2 / 3)
 _DISC_WEIGHTS = np.array([1 / 4, *[1 / 8] * 6])
+# So many samples and the intermediates of their lobes stay in the cache.
+_BLOCK = 50_000
 # Of a difference in the parameters of a lobe.
 _DIFFERENCE = 1e-5
 
@@ -279,14 +281,7 @@ class Lobe(ABC):
 
     def starts(self) -> list[tuple[Distribution, Array]]:
         """Return distributions and the parameters of all half widths, for each γ of a grid."""
-        scan, mdf = self.scan, self.what.distribution
-        tangents = np.geomspace(scan.narrowest, scan.widest, scan.half_widths)
-        if not self.what.is_gamma_free or mdf.second_parameter is None:
-            return [(mdf, _parameters(mdf, tangents))]
-        ends = mdf.second_parameter.fit_range
-        gammas = np.geomspace(*ends, scan.gammas)
-        shapes = [mdf.with_gamma(float(np.clip(gamma, *ends))) for gamma in gammas]
-        return [(shape, _parameters(shape, tangents)) for shape in shapes]
+        return _starts(self.scan, self.what)
 
     def distribution(self, point: Array) -> Distribution:
         """Return the distribution with the γ of a point."""
@@ -360,15 +355,14 @@ class SliceLobe(Lobe):
 
     def __init__(self, samples: Samples, *rest: Any) -> None:
         super().__init__(samples, *rest)
-        self._angles = Angles(samples.beta[None, :])
+        self._angles = _in_blocks(samples.beta)
         self._foreshortening = foreshortening(samples.beta, samples.quantity)
         self.places = np.unique(samples.beta).size
         self.where = f" at {self.places} angles"
 
     def scanned(self, mdf: Distribution, parameters: Array) -> Terms:
         """Return terms of many parameters."""
-        with np.errstate(all="ignore"):
-            lobes = mdf.shape(self._angles, parameters[:, None])
+        lobes = _lobes(mdf, self._angles, parameters, normalized=False)
         return self._with_offset(lobes / self._foreshortening)
 
     def transform(self) -> Transform | None:
@@ -391,12 +385,9 @@ class SliceLobe(Lobe):
         return self.what.distribution.maximum(np.exp(point[:2]), normalized=True)
 
     def _shape(self, mdf: Distribution, parameter: float) -> Array:
-        value = np.array([[parameter]])
-        with np.errstate(all="ignore"):
-            shape = mdf.shape(self._angles, value)[0] / self._foreshortening
-        if self.what.is_double:
-            shape *= float(mdf.maximum(value, normalized=True)[0, 0])
-        return np.asarray(shape)
+        value, normalized = np.array([parameter]), self.what.is_double
+        lobe = _lobes(mdf, self._angles, value, normalized=normalized)[0]
+        return np.asarray(lobe / self._foreshortening)
 
     def _terms(self, shape: Array, point: Array) -> Terms:
         return self._with_offset(shape)
@@ -423,10 +414,16 @@ class DirectionalLobe(Lobe):
 
     def __init__(self, samples: DirectionalSamples, *rest: Any) -> None:
         super().__init__(samples, *rest)
-        self._at = _Geometry(*_seen(samples, self.options.aperture))
+        self._at = _Geometry(samples, self.options.aperture)
         self._index = _check_fresnel(self.fresnel)
         self.linear = ("diffuse", *self._strengths())
         self._last: dict[tuple[Any, ...], Array] = {}
+
+    def with_fresnel(self, fresnel: str) -> Self:
+        """Return the lobe with another Fresnel factor."""
+        other = super().with_fresnel(fresnel)
+        other._at, other._last = self._at, self._last
+        return other
 
     def _strengths(self) -> tuple[str, ...]:
         """Return the names of the coefficients that carry the strength of the lobe."""
@@ -449,9 +446,7 @@ class DirectionalLobe(Lobe):
     def scanned(self, mdf: Distribution, parameters: Array) -> Terms:
         """Return terms of many parameters."""
         at = self._at
-        with np.errstate(all="ignore"):
-            lobe = mdf.shape(at.angles, parameters[:, None])
-            lobe *= mdf.maximum(parameters[:, None], normalized=True)
+        lobe = _lobes(mdf, at.angles, parameters, normalized=True)
         factor = dielectric(at.difference_cosine, _TYPICAL_INDEX) / _F0_TYPICAL
         lobe *= at.v_cavity * factor / at.denominator
         return self._averaged(np.stack([np.full_like(lobe, 1 / np.pi), lobe], axis=-2), 0 * lobe)
@@ -466,13 +461,16 @@ class DirectionalLobe(Lobe):
             return None
         if self.options.loss == "log":
             return LOGARITHM
-        return cube_root(self.samples.outgoing[:, 2]) if self.options.loss == "cube-root" else None
+        return CUBE_ROOT if self.options.loss == "cube-root" else None
 
     def weight(self) -> Array:
         """Return the weights."""
         deviations = self.deviations()
         if deviations is not None:
             return 1 / np.square(deviations.T)
+        if self.options.loss == "cube-root":
+            # The cube root of the cosine, squared.
+            return np.cbrt(np.square(self.samples.outgoing[:, 2]))
         if self.options.loss == "cosine":
             return np.square(self.samples.incident[:, 2] * self.samples.outgoing[:, 2])
         return np.ones(len(self.samples.values))
@@ -488,15 +486,13 @@ class DirectionalLobe(Lobe):
 
     def _computed_shape(self, mdf: Distribution, parameter: float) -> Array:
         at = self._at
-        value = np.array([[parameter]])
-        with np.errstate(all="ignore"):
-            lobe = mdf.shape(at.angles, value)[0]
-            lobe *= mdf.maximum(value, normalized=True)[0]
+        lobe = _lobes(mdf, at.angles, np.array([parameter]), normalized=True)[0]
         lobe /= at.denominator
         if self.options.masking == "v-cavity":
             lobe *= at.v_cavity
         elif self.options.masking == "smith":
-            total = mdf.smith_lambda(at.incident_tangent, parameter)[at.incident_of]
+            incident, whose = at.incident_tangents
+            total = mdf.smith_lambda(incident, parameter)[whose]
             total += mdf.smith_lambda(at.outgoing_tangent, parameter)
             total += 1
             lobe /= total
@@ -543,19 +539,67 @@ def tangent(vectors: Array) -> Array:
     return np.hypot(vectors[:, 0], vectors[:, 1]) / vectors[:, 2]
 
 
-class _Geometry:
-    """What lobes need of pairs of directions."""
+def _in_blocks(beta: Array) -> list[Angles]:
+    """Return angles, shape (n,), in parts of shape (1, any) whose intermediates stay in cache."""
+    return [Angles(part[None]) for part in np.split(beta, range(_BLOCK, beta.size, _BLOCK))]
 
-    def __init__(self, incident: Array, outgoing: Array) -> None:
-        half = half_vector(incident, outgoing)
-        self.angles = Angles(polar_angle(half)[None, :])
-        self.difference_cosine = np.clip(dot(incident, half), 0, 1)
-        self.schlick = np.power(1 - self.difference_cosine, 5)
-        self.denominator = 4 * incident[:, 2] * outgoing[:, 2]
-        self.v_cavity = v_cavity(incident, outgoing, half)
-        # A scan has many samples at a few angles of incidence.
-        self.incident_tangent, self.incident_of = np.unique(tangent(incident), return_inverse=True)
-        self.outgoing_tangent = tangent(outgoing)
+
+def _lobes(
+    mdf: Distribution, angles: Sequence[Angles], parameters: Array, *, normalized: bool
+) -> Array:
+    """Return lobes of parameters, shape (m,), at angles in parts, shape (m, n)."""
+    column = parameters[:, None]
+    with np.errstate(all="ignore"):
+        parts = [mdf.shape(part, column) for part in angles]
+        lobes = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+        if normalized:
+            lobes *= mdf.maximum(column, normalized=True)
+    return lobes
+
+
+class _Geometry:
+    """What lobes need of pairs of directions, of each what is asked for."""
+
+    def __init__(self, samples: DirectionalSamples, aperture: float | None) -> None:
+        self._samples, self._aperture = samples, aperture
+
+    @cached_property
+    def _directions(self) -> tuple[Array, Array]:
+        return _seen(self._samples, self._aperture)
+
+    @cached_property
+    def _half(self) -> Array:
+        return half_vector(*self._directions)
+
+    @cached_property
+    def angles(self) -> list[Angles]:
+        return _in_blocks(polar_angle(self._half))
+
+    @cached_property
+    def difference_cosine(self) -> Array:
+        return np.clip(dot(self._directions[0], self._half), 0, 1)
+
+    @cached_property
+    def schlick(self) -> Array:
+        return np.power(1 - self.difference_cosine, 5)
+
+    @cached_property
+    def denominator(self) -> Array:
+        incident, outgoing = self._directions
+        return 4 * incident[:, 2] * outgoing[:, 2]
+
+    @cached_property
+    def v_cavity(self) -> Array:
+        return v_cavity(*self._directions, self._half)
+
+    @cached_property
+    def incident_tangents(self) -> tuple[Array, Indices]:
+        """The tangents of the angles of incidence, of which a scan has few, and whose they are."""
+        return np.unique(tangent(self._directions[0]), return_inverse=True)
+
+    @cached_property
+    def outgoing_tangent(self) -> Array:
+        return tangent(self._directions[1])
 
 
 def _seen(samples: DirectionalSamples, aperture: float | None) -> tuple[Array, Array]:
@@ -587,6 +631,19 @@ def lobe_at(samples: Measurements, what: LobeShape, options: BrdfModel, fresnel:
 def foreshortening(beta: Array, quantity: str) -> Array:
     """Return cos²β for a BRDF at θ_d = 0, where it is D̄/cos²β but for masking; else 1."""
     return np.square(np.cos(beta)) if quantity == "brdf" else np.ones_like(beta)
+
+
+@lru_cache(maxsize=64)
+def _starts(scan: Scan, what: LobeShape) -> list[tuple[Distribution, Array]]:
+    """Return what a candidate's scan begins with: the same for all samples."""
+    mdf = what.distribution
+    tangents = np.geomspace(scan.narrowest, scan.widest, scan.half_widths)
+    if not what.is_gamma_free or mdf.second_parameter is None:
+        return [(mdf, _parameters(mdf, tangents))]
+    ends = mdf.second_parameter.fit_range
+    gammas = np.geomspace(*ends, scan.gammas)
+    shapes = [mdf.with_gamma(float(np.clip(gamma, *ends))) for gamma in gammas]
+    return [(shape, _parameters(shape, tangents)) for shape in shapes]
 
 
 def _parameters(target: Distribution, tangents: Array) -> Array:

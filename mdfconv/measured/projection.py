@@ -8,7 +8,8 @@ sums run along contiguous memory.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -17,30 +18,26 @@ import numpy as np
 
 from mdfconv.distributions.evaluation import Array
 
+# Samples at a time: three arrays of three channels are 1 MB.
+_BLOCK = 16384
 # Linear steps: at the right parameter six are exact under 50 % of noise.
 _STEPS = 12
-_TOLERANCE = 1e-9
+# A step of this size, relatively, leaves far less than its size.
+_TOLERANCE = 1e-6
 # Of the smallest value: a model is kept positive, far from where a fit ends.
 _SMALLEST_MODEL = 1e-3
 
 
 @dataclass(frozen=True)
 class Transform:
-    """What a loss compares instead of values: `value` of them, and its `slope`."""
+    """What a loss compares instead of values: `value` of them, and its `slope` by both."""
 
     value: Callable[[Array], Array]
-    slope: Callable[[Array], Array]
+    slope: Callable[[Array, Array], Array]
 
 
-LOGARITHM = Transform(np.log, np.reciprocal)
-
-
-def cube_root(factor: Array) -> Transform:
-    """Return the cube root of values times a factor, shape (n,)."""
-    root = np.cbrt(factor)
-    return Transform(
-        lambda value: root * np.cbrt(value), lambda value: root / (3 * np.square(np.cbrt(value)))
-    )
+LOGARITHM = Transform(np.log, lambda value, _: 1 / value)
+CUBE_ROOT = Transform(np.cbrt, lambda value, root: root / (3 * value))
 
 
 class Terms(NamedTuple):
@@ -51,10 +48,17 @@ class Terms(NamedTuple):
 
     def at(self, coefficients: Array) -> Array:
         """Return the model, shape (..., channels, n), of coefficients (..., channels, k)."""
-        value = self.fixed[..., None, :]
-        for place in range(self.basis.shape[-2]):
-            value = value + coefficients[..., place, None] * self.basis[..., None, place, :]
+        value = coefficients[..., 0, None] * self.basis[..., None, 0, :]
+        value += self.fixed[..., None, :]
+        for place in range(1, self.basis.shape[-2]):
+            value += coefficients[..., place, None] * self.basis[..., None, place, :]
         return value
+
+    def blocks(self) -> Iterator[tuple[slice, Terms]]:
+        """Yield the terms of blocks of samples that stay in the processor's cache."""
+        for start in range(0, self.fixed.shape[-1], _BLOCK):
+            block = slice(start, start + _BLOCK)
+            yield block, Terms(self.basis[..., block], self.fixed[..., block])
 
 
 class Projected(NamedTuple):
@@ -79,6 +83,12 @@ class Projection:
             self._wanted = transform.value(values)
             self._smallest = _SMALLEST_MODEL * values.min(axis=-1, keepdims=True)
 
+    def weighted(self, weight: Array) -> Projection:
+        """Return the projection with other weights."""
+        other = copy(self)
+        other._weight, other._root = weight, np.sqrt(weight)
+        return other
+
     def __call__(
         self, terms: Terms, start: Array | None = None, *, steps: int = _STEPS
     ) -> Projected:
@@ -96,27 +106,44 @@ class Projection:
             residual *= self._root
             return Projected(coefficients, residual, np.broadcast_to(self._root, values.shape))
         if start is None:
-            weight = self._weight * np.square(transform.slope(values))
+            weight = self._weight * np.square(transform.slope(values, self._wanted))
             start = nonnegative(terms, values, weight)
         coefficients = start
         for _ in range(steps):
-            near = np.maximum(terms.at(coefficients), self._smallest)
-            gain = transform.slope(near)
-            # One Gauss-Newton step for the transformed values is a weighted linear fit.
-            working = self._wanted - transform.value(near)
-            working /= gain
-            working += near
-            gain *= gain
-            gain *= self._weight
-            before, coefficients = coefficients, nonnegative(terms, working, gain)
+            before, coefficients = coefficients, self._improved(terms, coefficients, transform)
             change = np.abs(coefficients - before)
             if not (change > _TOLERANCE * np.abs(coefficients)).any():
                 break
-        near = np.maximum(terms.at(coefficients), self._smallest)
-        residual = transform.value(near)
-        residual -= self._wanted
-        residual *= self._root
-        return Projected(coefficients, residual, self._root * transform.slope(near))
+        shape = (*coefficients.shape[:-1], terms.fixed.shape[-1])
+        residual, gain = np.empty(shape), np.empty(shape)
+        for block, part in terms.blocks():
+            _, shown, slope = self._transformed(part, coefficients, transform)
+            shown -= self._wanted[..., block]
+            np.multiply(shown, self._root[..., block], out=residual[..., block])
+            np.multiply(slope, self._root[..., block], out=gain[..., block])
+        return Projected(coefficients, residual, gain)
+
+    def _improved(self, terms: Terms, coefficients: Array, transform: Transform) -> Array:
+        """Return better coefficients by a Gauss-Newton step, which is a weighted linear fit."""
+        sums = []
+        for block, part in terms.blocks():
+            near, shown, gain = self._transformed(part, coefficients, transform)
+            working = self._wanted[..., block] - shown
+            working /= gain
+            working += near
+            gain *= gain
+            gain *= self._weight[..., block]
+            sums.append(_normal_equations(part, working, gain))
+        return _nonnegative_solution(sums)
+
+    def _transformed(
+        self, terms: Terms, coefficients: Array, transform: Transform
+    ) -> tuple[Array, Array, Array]:
+        """Return a model, what the loss compares instead, and the slope of that."""
+        near = terms.at(coefficients)
+        np.maximum(near, self._smallest, out=near)
+        shown = transform.value(near)
+        return near, shown, transform.slope(near, shown)
 
 
 def nonnegative(terms: Terms, values: Array, weight: Array) -> Array:
@@ -124,12 +151,27 @@ def nonnegative(terms: Terms, values: Array, weight: Array) -> Array:
 
     Of all choices of coefficients that are not zero the best legal one (at most three: eight).
     """
+    return _nonnegative_solution(
+        [
+            _normal_equations(part, values[..., block], weight[..., block])
+            for block, part in terms.blocks()
+        ]
+    )
+
+
+def _normal_equations(terms: Terms, values: Array, weight: Array) -> tuple[Array, Array]:
+    """Return the matrix and the right side of a weighted linear fit of each channel."""
     basis = terms.basis
     weighted = basis[..., None, :, :] * (weight if weight.ndim < 2 else weight[..., :, None, :])
     # Of so few rows faster than a product of matrices, whose threads wait for each other.
     normal = np.einsum("...in,...jn->...ij", weighted, basis[..., None, :, :])
     wanted = values - terms.fixed[..., None, :]
-    right = np.einsum("...n,...n->...", weighted, wanted[..., None, :])
+    return normal, np.einsum("...n,...n->...", weighted, wanted[..., None, :])
+
+
+def _nonnegative_solution(sums: Sequence[tuple[Array, Array]]) -> Array:
+    """Return the best coefficients ≥ 0 of normal equations, which are those of parts, summed."""
+    normal, right = (np.sum(parts, axis=0) for parts in zip(*sums, strict=True))
     # In units in which the diagonal is 1.
     size = np.sqrt(np.maximum(normal.diagonal(axis1=-2, axis2=-1), np.finfo(float).tiny))
     right /= size

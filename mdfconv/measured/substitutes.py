@@ -17,6 +17,7 @@ from mdfconv.distributions.parameter import Parameter
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.metrics.base import Display, srgb
 from mdfconv.measured.brdf_fit import MeasuredFit
+from mdfconv.output.records import percent
 
 # What a number keeps, and by what its error is also given.
 _LIGHT, _HIGHLIGHT = "environment", "display"
@@ -170,11 +171,6 @@ class Substitute:
             f"{text}; {self.end.text(self.on_screen)} looks nearest in a picture on a display "
             f"(error there {percent(best)} instead of {percent(other)})."
         )
-
-
-def percent(share: float) -> str:
-    """Return a share in per cent, with two digits."""
-    return f"{float(f'{100 * share:.2g}'):g} %"
 
 
 def substitute(fit: MeasuredFit, target: str) -> Substitute:

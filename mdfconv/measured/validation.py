@@ -14,7 +14,7 @@ import numpy as np
 
 from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.errors import MdfconvError
-from mdfconv.measured.brdf_fit import MeasuredFit, Minimum, Problem, checked, fit_distribution
+from mdfconv.measured.brdf_fit import MeasuredFit, Minimum, Problem, checked, refitted_as
 from mdfconv.measured.model import LOSSLESS, LobeShape, lobe_at
 from mdfconv.measured.samples import DirectionalSamples, Measurements, some_rows
 from mdfconv.measured.scans import incidence_groups, scan_order
@@ -59,16 +59,18 @@ def validated(samples: Measurements, fit: MeasuredFit) -> MeasuredFit:
     """
     whole = _problem(samples, fit)
     folds, are_incidences = _folds(whole.lobe.samples)
-    everything = np.arange(whole.count)
+    everything, start = np.arange(whole.count), whole.at(fit)
     outcomes = []
     for fold in folds:
-        rest = whole.part(np.setdiff1d(everything, fold, assume_unique=True))
+        rest = np.setdiff1d(everything, fold, assume_unique=True)
         try:
-            checked(rest.lobe)
-            minimum = rest.descend(fit.point, steps=_STEPS, smallest=_SMALLEST_STEP)
+            checked(whole.lobe.part(rest))
         except MdfconvError:
             continue
-        outcomes.append((minimum, _error_at(whole.part(fold), minimum)))
+        inside, outside = np.zeros(whole.count), whole.robust.copy()
+        inside[fold], outside[fold] = whole.robust[fold], 0
+        minimum = start.weighted(outside).descend(steps=_STEPS, smallest=_SMALLEST_STEP)
+        outcomes.append((minimum, minimum.error_at(inside)))
     if len(outcomes) < 2:
         return fit
     errors = np.array([error for _, error in outcomes])
@@ -103,11 +105,6 @@ def _folds(samples: Measurements) -> tuple[list[Indices], bool]:
     block = np.arange(len(order)) * min(_BLOCKS, len(order)) // len(order)
     folds = [order[block % _BLOCK_FOLDS == fold] for fold in range(_BLOCK_FOLDS)]
     return [fold for fold in folds if fold.size], False
-
-
-def _error_at(problem: Problem, minimum: Minimum) -> float:
-    """Return the error of a fit at samples that it does not know."""
-    return problem.at(minimum.point, minimum.projected.coefficients).error
 
 
 def _unit(values: Array) -> float:
@@ -146,9 +143,12 @@ def by_incidence(samples: Measurements, fit: MeasuredFit) -> list[IncidenceFit]:
     is_free = fresnel != LOSSLESS
     options = replace(fit.options, fresnel=fresnel, free_specular=is_free)
     alone = []
+    random = np.random.default_rng(_SEED)
     for angle, group in _incidences(samples):
+        index = some_rows(random, len(group), _MOST_SAMPLES)
+        some = samples.select(group if index is None else group[index])
         try:
-            one = fit_distribution(samples.select(group), what, options)
+            one = refitted_as(some, fit, options, fresnel, what)
             numbers = one.parameter, one.parameter_error
         except MdfconvError:
             numbers = np.nan, np.nan

@@ -75,6 +75,21 @@ def with_error(value: float, error: float | None) -> str:
     return text + (f"·{power_of_ten(power)}" if power else "")
 
 
+def percent(share: float, *, is_aligned: bool = False) -> str:
+    """Return a share in percent: two digits, and of large ones all before the point.
+
+    In a column they are aligned: a second digit that is 0 is written, too.
+    """
+    number = 100 * share
+    if 0 < number < 0.01:
+        return "less than 0.01 %"
+    if number > 1e4:
+        return "more than 10000 %"
+    if number >= 9.95:
+        return f"{number:.0f} %"
+    return f"{number:#.2g} %" if is_aligned else f"{number:.2g} %"
+
+
 def power_of_ten(power: int) -> str:
     """Return a power of ten for people, as 10⁻⁵."""
     return f"10{str(power).translate(_RAISED)}"

@@ -12,6 +12,7 @@ from mdfconv.brdf.fresnel import (
     SMOOTHIE_FIT,
     conductor,
     dielectric,
+    dielectric_index,
     normal_reflectance,
     schlick_fresnel,
     smoothie_fresnel,
@@ -80,6 +81,13 @@ def test_both_sides_of_an_interface_agree():
     assert normal_reflectance(1.5) == pytest.approx(0.04, rel=1e-15)
     assert normal_reflectance(1 / 1.5) == pytest.approx(0.04, rel=1e-15)
     assert float(dielectric(1.0, 1.37)) == pytest.approx(normal_reflectance(1.37), rel=1e-14)
+
+
+def test_the_index_of_a_reflectance_is_the_inverse():
+    for index in INDICES[1:]:
+        reflectance = float(((mp.mpf(index) - 1) / (mp.mpf(index) + 1)) ** 2)
+        assert dielectric_index(reflectance) == pytest.approx(index, rel=1e-13)
+    np.testing.assert_allclose(dielectric_index([[0.0, 0.04]]), [[1, 1.5]], rtol=1e-15)
 
 
 def test_approximations():

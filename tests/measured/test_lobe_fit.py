@@ -5,13 +5,14 @@ import itertools
 import numpy as np
 import pytest
 from scipy import stats
-from scipy.optimize import curve_fit
+from scipy.optimize import curve_fit, least_squares
 
 import mdfconv
 from mdfconv.measured import brdf_fit
 from mdfconv.measured.analysis import fit
 from mdfconv.measured.model import BrdfModel, foreshortening
 from mdfconv.measured.samples import Samples
+from mdfconv.measured.validation import validated
 
 BETA = np.radians(np.arange(0, 88, 1.5))
 TRUTH = {
@@ -176,6 +177,43 @@ def test_logarithmic_loss_against_curve_fit():
     )
     assert fit.parameter == pytest.approx(best[0], rel=1e-6)
     assert first(fit.errors) == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-2)
+
+
+@pytest.mark.parametrize("loss", ["linear", "log"])
+@pytest.mark.parametrize("name", ["beckmann", "blinn-phong", "sawicki"])
+def test_a_shape_that_does_not_fit_has_its_least_squares_too(name, loss):
+    """Where the residuals are no noise, JᵀJ is not the Hessian."""
+    truth = of_two_parameters("gtr", 0.2, 1.2)
+    found = fit_distribution(truth, name, BrdfModel(loss, robust=False))
+    wanted, mdf = truth.values[:, 0], mdfconv.distribution(name)
+    shown = np.log if loss == "log" else np.asarray
+
+    def residual(x):
+        near = np.exp(x[1]) + np.exp(x[2]) * mdf.unit(BETA, float(np.exp(x[0])))
+        return shown(near) - shown(wanted)
+
+    start = np.log([found.parameter, found.linear["offset"][0], found.linear["scale"][0]])
+    least = least_squares(residual, start + 0.1, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    assert found.error > 0.02 * (1 if loss == "log" else wanted.max())
+    assert found.parameter == pytest.approx(np.exp(least.x[0]), rel=1e-5)
+    assert found.error == pytest.approx(np.sqrt(np.mean(least.fun**2)), rel=1e-9)
+
+
+@pytest.mark.parametrize("loss", ["linear", "log"])
+def test_the_validated_error_is_that_of_samples_left_out(loss):
+    """Every fifth block of a scan, of 25, is left out of a fit of its own."""
+    data = synthetic("ggx", np.random.default_rng(4), noise=0.003)
+    model = BrdfModel(loss, robust=False)
+    shown = np.log if loss == "log" else np.asarray
+    block = np.arange(len(BETA)) * 25 // len(BETA) % 5
+    errors = []
+    for fold in range(5):
+        out = block == fold
+        alone = fit_distribution(data.select(~out), "beckmann", model)
+        near = alone.model(data.select(out))
+        errors.append(np.mean((shown(near) - shown(data.values[out])) ** 2))
+    found = validated(data, fit_distribution(data, "beckmann", model))
+    assert found.validated_error == pytest.approx(np.sqrt(np.mean(errors)), rel=1e-4)
 
 
 def test_ranking_and_the_simplest():

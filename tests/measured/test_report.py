@@ -89,7 +89,8 @@ def fit(of, alpha, count, **changes):
         "share": None, "errors": {}, "linear": {}, "linear_errors": {}, "fresnel": "dielectric",
         "n": 1.5, "n_error": 0.01, "f0": f0, "f0_error": (0.001,) * count, "diffuse": k_d,
         "diffuse_error": (0.01,) * count, "specular": (1.0,) * count,
-        "specular_error": (0.0,) * count, "error": 0.07, "log_rmse": 0.07, "bic": -100.0,
+        "specular_error": (0.0,) * count, "loss": "log", "error": 0.07, "log_rmse": 0.07,
+        "bic": -100.0,
         "validated_error": 0.08, "validated_spread": 0.004, "unknowns": ("alpha", "n"),
         "correlation": np.array([[1, -0.41], [-0.41, 1]]), "at_limit": (),
         "model": model(alpha, count), "albedo": lambda theta: np.full(count, 0.5),
@@ -427,19 +428,21 @@ def test_numbers_that_are_not_known():
 
 
 @pytest.mark.parametrize(
-    ("options", "error", "loss"),
+    ("of_fit", "options", "error", "loss"),
     [
-        ({}, "7.0 % 8.0 ± 0.4 %", "differences of logarithms, with Huber"),
-        ({"loss": "linear"}, "0.0700 0.080 ± 0.004", "differences of values, with Huber"),
+        ("log", {}, "7.0 % 8.0 ± 0.4 %", "differences of logarithms, with Huber"),
+        ("linear", {"loss": "linear"}, "0.0700 0.080 ± 0.004", "differences of values, with Huber"),
         (
+            "sigma",
             {"noise": 0.02, "robust": False},
             "0.0700 σ 0.080 ± 0.004 σ",
             "standard deviations Solver",
         ),
     ],
 )
-def test_errors_have_the_unit_of_the_loss(options, error, loss):
-    analysis = analysis_of(result_of(scan()), **options)
+def test_errors_have_the_unit_of_the_loss(of_fit, options, error, loss):
+    fits = [fit(name, ALPHA, 1, loss=of_fit) for name in ("ggx", "beckmann")]
+    analysis = analysis_of(result_of(scan(), fits), **options)
     text = page_of(report_files([analysis], "x", Path("a.html"), [""])).text
     assert error in text
     assert loss in text

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from mdfconv.output.records import power_of_ten, with_error
+from mdfconv.output.records import percent, power_of_ten, with_error
 
 NAN = float("nan")
 
@@ -67,3 +67,22 @@ def test_digits_are_those_that_the_error_supports(value, sign, error):
     assert abs(shown_error - error) < 0.145 * error
     assert abs(shown - value) < 0.145 * error
     assert len(text.replace(".", "").strip("0")) <= 2
+
+
+@pytest.mark.parametrize(
+    ("share", "text", "aligned"),
+    [
+        (0.0, "0 %", "0.0 %"),
+        (9e-5, "less than 0.01 %", "less than 0.01 %"),
+        (0.00012, "0.012 %", "0.012 %"),
+        (0.07, "7 %", "7.0 %"),
+        (0.0994, "9.9 %", "9.9 %"),
+        (0.0995, "10 %", "10 %"),
+        (1.234, "123 %", "123 %"),
+        (101.0, "more than 10000 %", "more than 10000 %"),
+        (math.nan, "nan %", "nan %"),
+    ],
+)
+def test_a_share_has_two_digits(share, text, aligned):
+    assert percent(share) == text
+    assert percent(share, is_aligned=True) == aligned

@@ -51,13 +51,14 @@ class MapVariables:
 
     x = `width` of a parameter is the roughness of a smooth surface, at most 1; κ = `concentration`
     is 1/x² for a smooth surface, 0 for a uniform lobe. `from_map` returns the parameter for the x
-    of the source and the product x² κ.
+    of the source and the product x² κ; over `scale` of x it is a smooth function, too.
     """
 
     concentration: Callable[[Array], Array]
     from_map: Callable[[Array, Array], Array]
     width: Callable[[Array], Array] = same
     from_width: Callable[[Array], Array] = same
+    scale: Callable[[Array], Array] = same
 
 
 @dataclass(frozen=True)

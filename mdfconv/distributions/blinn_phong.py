@@ -48,6 +48,7 @@ class BlinnPhong(base.Distribution):
         from_width=lambda x: 2 * (1 - x) * (1 + x) / (x * x),
         concentration=base.same,
         from_map=lambda x, product: product / (x * x),
+        scale=lambda x: 1 / (x * x),
     )
     printed = base.Printed(
         lambda beta, n: np.cos(beta) ** n,

@@ -21,7 +21,7 @@ import numpy as np
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.base import MapVariables
 from mdfconv.distributions.endpoint import follow, to_root
-from mdfconv.distributions.evaluation import Array
+from mdfconv.distributions.evaluation import Array, Indices
 from mdfconv.distributions.table import PolynomialTable, filled
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.problem import ConversionTask
@@ -129,22 +129,23 @@ class StoredFit:
             last = follow(self._forward, parameter) * self._ratio
             return follow(self._back, np.minimum(last, self._last.parameter.upper))
         assert self.map is not None, "asked only for what is known"
-        values = parameter.ravel()
-        fits = np.empty_like(values)
+        source, target = self.variables
+        stored, values = self.map, parameter.ravel()
+        table, fits = _table(stored, target, self._upper), np.empty_like(values)
         for start in range(0, values.size, _BLOCK):
             block = slice(start, start + _BLOCK)
-            x = self.variables[0].width(follow(self._forward, values[block]))
-            fits[block] = follow(self._back, self._of_width(x))
-        return fits.reshape(parameter.shape)
+            x = source.width(follow(self._forward, values[block]))
+            tabulated = table(x)
+            tabulated *= target.scale(x)
+            np.minimum(tabulated, self._upper, out=tabulated)
+            fits[block] = follow(self._back, tabulated)
 
-    def _of_width(self, x: Array) -> Array:
-        """Return the parameters of the map's target, shape (n,), for x of its source."""
-        assert self.map is not None, "asked only for what is known"
-        stored, target = self.map, self.variables[1]
-        fits = _table(stored, target, self._upper)(x)
-        fits *= target.scale(x)
-        np.minimum(fits, self._upper, out=fits)
-        return filled(fits, lambda rows: target.from_map(x[rows], stored(x[rows])))
+        def exact(rows: Indices) -> Array:
+            x = source.width(follow(self._forward, values[rows]))
+            return follow(self._back, target.from_map(x, stored(x)))
+
+        # Together: they are few, and a polynomial of theirs has many steps.
+        return filled(fits, exact).reshape(parameter.shape)
 
     def range_text(self) -> str:
         """Return which parameters of the source the maps cover; "" for all."""

@@ -133,7 +133,8 @@ class FitProblem:
         self._source_breaks = self._breaks(source, self._source_parameter, self._peak, self.tangent)
         # Unless the panels move with the target, all distances share their samples.
         self._samples: Sampled | None = None
-        if not self.metric.kinks and self.target.edge(np.ones(1)) is None:
+        self.target_has_edge = self.target.edge(np.ones(1)) is not None
+        if not self.metric.kinks and not self.target_has_edge:
             self._samples = self._sampled(self._all, self._source_breaks)
 
     @property

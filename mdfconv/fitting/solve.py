@@ -134,8 +134,8 @@ _AS_LOW = 1 + 1e-9
 _CLEARLY_LOWER = 0.98
 # Steps of a descent that do not shrink to this share lead nowhere; the smallest are rounding.
 _MOST_LEFT, _ROUNDING = 0.9, 1e-7
-# Over a shorter step panels that end at a kink or an edge may stay: what they miss falls with its
-# square.
+# Over a shorter step panels that end at a kink may stay, which leaves less than that step. Those
+# that end at an edge may not: there the signal rises steeply.
 _STANDS_STILL = 2e-6
 
 
@@ -302,7 +302,7 @@ def descend(problem: FitProblem, start: Array) -> tuple[Array, Array]:
     log_start = np.log(start)
     samples = problem.samples(log_start)
     first, _ = problem.step(log_start, samples)
-    if (np.abs(first) > _STANDS_STILL).any():
+    if problem.target_has_edge or (np.abs(first) > _STANDS_STILL).any():
         samples = problem.samples(log_start + first)
     second, distance = problem.step(log_start + first, samples)
     left = second / first

@@ -8,7 +8,7 @@ import numpy as np
 
 from mdfconv.distributions import base
 from mdfconv.distributions.angles import Angles
-from mdfconv.distributions.elementary import exp_of_product, one_minus_exp_of_product
+from mdfconv.distributions.elementary import exp_of_product, log1p, one_minus_exp_of_product
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import REFLECTED, Parameter
 
@@ -89,7 +89,7 @@ class BlinnPhong(base.Distribution):
 
     def _from_half_tangent(self, tangent: Array) -> Array:
         # Sawicki 2021, eq. (3): N = −ln 2 / ln cos β_half.
-        return 2 * np.log(2) / np.log1p(np.square(tangent))
+        return 2 * np.log(2) / log1p(np.square(tangent))
 
     def _peak_alpha(self, parameter: Array) -> Array:
         return np.sqrt(2 / (parameter + 2))

@@ -215,6 +215,10 @@ class ClosedForm(FormulaMethod):
         return {outside: (parameter < lower) | (parameter > upper)} | super().cautions(task, result)
 
 
+# So many numbers and their intermediates stay in the cache.
+_BLOCK = 32768
+
+
 class HalfAngle(Method):
     """Both distributions fall to half of their value at the normal at the same angle.
 
@@ -227,7 +231,13 @@ class HalfAngle(Method):
 
     def convert(self, task: ConversionTask) -> Array:
         """Go through tan β_half; NaN where a distribution never falls to one half."""
-        return task.target.from_half_tangent(task.source.half_tangent(task.parameter))
+        values = task.parameter.ravel()
+        result = np.empty_like(values)
+        for start in range(0, values.size, _BLOCK):
+            block = slice(start, start + _BLOCK)
+            tangent = task.source.half_tangent(values[block])
+            result[block] = task.target.from_half_tangent(tangent)
+        return result.reshape(task.parameter.shape)
 
 
 class Ward(FormulaMethod):

@@ -51,13 +51,14 @@ class MapVariables:
 
     x = `width` of a parameter is the roughness of a smooth surface, at most 1; κ = `concentration`
     is 1/x² for a smooth surface, 0 for a uniform lobe. `from_map` returns the parameter for the x
-    of the source and the product x² κ.
+    of the source and the product x² κ; over `scale` of x it is a smooth function, too.
     """
 
     concentration: Callable[[Array], Array]
     from_map: Callable[[Array, Array], Array]
     width: Callable[[Array], Array] = same
     from_width: Callable[[Array], Array] = same
+    scale: Callable[[Array], Array] = same
 
 
 @dataclass(frozen=True)
@@ -629,7 +630,8 @@ class Distribution(ABC):
         return float(np.log(lower)), float(np.log(min(self.parameter.upper, 1 / _SMALLEST_ANGLE)))
 
     def _legal(self, parameter: Any) -> Any:
-        return np.where(self.parameter.accepts(parameter), parameter, np.nan)[()]
+        legal = self.parameter.accepts(parameter)
+        return parameter if legal.all() else np.where(legal, parameter, np.nan)[()]
 
     def _evaluate(
         self,
@@ -777,7 +779,8 @@ def _elementwise(function: Kernel, values: ArrayLike) -> Any:
 def _positive(values: ArrayLike) -> Array:
     """Return real numbers as float64, NaN where they are not positive."""
     array = np.asarray(as_operand(values), dtype=float)
-    return np.where(array > 0, array, np.nan)
+    positive = array > 0
+    return array if positive.all() else np.where(positive, array, np.nan)
 
 
 def negative_log_tail(lobe: Array, tail: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,6 +12,7 @@ from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.elementary import exp_of_product, one_minus_exp_of_product
 from mdfconv.distributions.evaluation import Array, inverse_square
 from mdfconv.distributions.parameter import GLOSSINESS, ROUGHNESS, Parameter
+from mdfconv.distributions.table import TO_ROUNDING, PolynomialTable, filled
 
 _NEWTON_STEPS = 12
 
@@ -109,18 +111,30 @@ class Beckmann(base.AlphaDistribution, base.AnisotropicDistribution):
         return np.square(2 * square) * np.exp(1 / square - 2)
 
     def _half_tangent(self, parameter: Array) -> Array:
-        # z = t²/m² solves z = ln 2 + 2 ln(1 + m² z). The difference is convex and rises with
-        # slope ≥ 1/2 from z = 4 on, so Newton steps from there close in from above.
         square = np.square(parameter)
-        z = np.full_like(square, 4.0)
-        for _ in range(_NEWTON_STEPS):
-            value = z - np.log(2) - 2 * np.log1p(square * z)
-            z = z - value / (1 - 2 * square / (1 + square * z))
-        return parameter * np.sqrt(z)
+        slope = _half_slopes()(square / (1 + square))
+        return parameter * filled(slope, lambda rows: _half_slope(square[rows]))
 
     def _from_half_tangent(self, tangent: Array) -> Array:
         # Sawicki 2021, eq. (9), with −4 ln cos β = 2 ln(1 + t²): no digits lost when smooth.
-        return tangent / np.sqrt(np.log(2) + 2 * np.log1p(np.square(tangent)))
+        return tangent / np.sqrt(np.log(2) + 2 * np.log(1 + np.square(tangent)))
+
+
+def _half_slope(square: Array) -> Array:
+    """Return tan β_half/m for m²."""
+    # z = t²/m² solves z = ln 2 + 2 ln(1 + m² z). The difference is convex and rises with
+    # slope ≥ 1/2 from z = 4 on, so Newton steps from there close in from above.
+    z = np.full_like(square, 4.0)
+    for _ in range(_NEWTON_STEPS):
+        value = z - np.log(2) - 2 * np.log1p(square * z)
+        z = z - value / (1 - 2 * square / (1 + square * z))
+    return np.sqrt(z)
+
+
+@cache
+def _half_slopes() -> PolynomialTable:
+    """Return tan β_half/m as a function of m²/(1+m²)."""
+    return PolynomialTable(lambda x: _half_slope(x / (1 - x)), *TO_ROUNDING)
 
 
 def slope_scale(x: Array, y: Array, phi: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from mdfconv.distributions import base
 from mdfconv.distributions.angles import Angles
-from mdfconv.distributions.elementary import exp_of_product, one_minus_exp_of_product
+from mdfconv.distributions.elementary import exp_of_product, log1p, one_minus_exp_of_product
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import REFLECTED, Parameter
 
@@ -48,6 +48,7 @@ class BlinnPhong(base.Distribution):
         from_width=lambda x: 2 * (1 - x) * (1 + x) / (x * x),
         concentration=base.same,
         from_map=lambda x, product: product / (x * x),
+        scale=lambda x: 1 / (x * x),
     )
     printed = base.Printed(
         lambda beta, n: np.cos(beta) ** n,
@@ -88,7 +89,7 @@ class BlinnPhong(base.Distribution):
 
     def _from_half_tangent(self, tangent: Array) -> Array:
         # Sawicki 2021, eq. (3): N = −ln 2 / ln cos β_half.
-        return 2 * np.log(2) / np.log1p(np.square(tangent))
+        return 2 * np.log(2) / log1p(np.square(tangent))
 
     def _peak_alpha(self, parameter: Array) -> Array:
         return np.sqrt(2 / (parameter + 2))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from mdfconv.distributions import base
 from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import Parameter
+from mdfconv.distributions.table import TO_ROUNDING, PolynomialTable, filled
 
 _NEWTON_STEPS = 12
 
@@ -34,6 +37,7 @@ class Sawicki(base.Distribution):
         from_width=lambda x: 8 / (3 * x * x) - 3,
         concentration=base.same,
         from_map=lambda x, product: product / (x * x),
+        scale=lambda x: 1 / (x * x),
     )
     printed = base.Printed(
         lambda beta, n: 256 * np.cos(beta) / ((1 - n) * np.cos(beta) + n + 3) ** 4,
@@ -87,28 +91,38 @@ class Sawicki(base.Distribution):
         return 2 * np.arcsin(np.sqrt(0.5 * drop))
 
     def _half_tangent(self, parameter: Array) -> Array:
-        # ½ (1 + kv)⁴ = 1 − v, k = (N−1)/4: convex and rising in v, so Newton steps from a point
-        # to the right of the root close in on it.
-        k = 0.25 * (parameter - 1)
-        start = np.expm1(np.log(2) / 4)
-        v = np.where(k > start, start / np.where(k > start, k, 1), 1.0)
-        for _ in range(_NEWTON_STEPS):
-            base = 1 + k * v
-            value = 0.5 * base**4 - 1 + v
-            v = v - value / (2 * k * base**3 + 1)
-        return np.sqrt(v * (2 - v)) / (1 - v)
+        h = 4 / (parameter + 3)
+        ratio = _half_ratios()(0.75 * h)
+        return np.sqrt(h) * filled(ratio, lambda rows: _half_ratio(h[rows]))
 
     def _from_half_tangent(self, tangent: Array) -> Array:
         # Sawicki 2021, eq. (10), as 1 + 4 ((2c)^¼ − 1)/(1 − c), which stays accurate as c → 1.
         secant = np.sqrt(1 + np.square(tangent))
         drop = np.square(tangent) / (secant * (1 + secant))
-        return 1 + 4 * np.expm1(0.25 * np.log(2 / secant)) / drop
+        return 1 + 4 * (np.sqrt(np.sqrt(2 / secant)) - 1) / drop
 
     def _peak_alpha(self, parameter: Array) -> Array:
         return np.sqrt(8 / (3 * (3 + parameter)))
 
     def _from_peak_alpha(self, alpha: Array) -> Array:
         return 8 / (3 * np.square(alpha)) - 3
+
+
+def _half_ratio(h: Array) -> Array:
+    """Return tan β_half/√h for h = 4/(N+3)."""
+    # v = 1 − cos β_half = h g solves ½ (1 + (1−h) g)⁴ = 1 − h g. The difference is convex and rises
+    # in g, so Newton steps from 1, right of the root, close in on it.
+    g = np.ones_like(h)
+    for _ in range(_NEWTON_STEPS):
+        base = 1 + (1 - h) * g
+        g = g - (0.5 * base**4 - 1 + h * g) / (2 * (1 - h) * base**3 + h)
+    return np.sqrt(g * (2 - h * g)) / (1 - h * g)
+
+
+@cache
+def _half_ratios() -> PolynomialTable:
+    """Return tan β_half/√h as a function of ¾ h."""
+    return PolynomialTable(lambda x: _half_ratio(x / 0.75), *TO_ROUNDING)
 
 
 DISTRIBUTIONS = (Sawicki(),)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -11,12 +11,15 @@ from mdfconv.distributions import base
 from mdfconv.distributions.angles import Angles
 from mdfconv.distributions.evaluation import Array
 from mdfconv.distributions.parameter import Parameter
+from mdfconv.distributions.table import TO_ROUNDING, PolynomialTable, filled
 
 # Where y = x/m is smaller than this, 1 − w is a difference of numbers that agree in too many digits
 # for the type at hand.
 _JUST_BEYOND = 1 + 1e-6
-# Of ln 10, between the ends of w: they leave the rounding.
-_HALVINGS = 56
+# What they leave, a Newton step squares.
+_HALVINGS = 34
+# tan β_half of a lobe that no double tells from the uniform one.
+_LARGEST_TANGENT = 1e100
 _EDGE = {np.dtype(np.float32): 1e-2, np.dtype(np.float64): 5e-4}
 
 
@@ -113,22 +116,85 @@ class Schlick(base.AlphaDistribution):
         return 2 * np.arcsin(np.sqrt(0.5 * parameter * w))
 
     def _half_tangent(self, parameter: Array) -> Array:
-        # ½ (1 − m w)(1 + (1−m)/m · w (2−w))² = 1 − w, by halving the logarithm of w: a smooth lobe
-        # has it near 0.2 m, a rough one next to the edge at 1, and all of them from 0.1 m to m.
-        low, high = 0.1 * parameter, 1.0 * parameter
-        bend = (1 - parameter) / parameter
-        for _ in range(_HALVINGS):
-            w = np.sqrt(low * high)
-            above = 0.5 * (1 - parameter * w) * np.square(1 + bend * w * (2 - w)) < 1 - w
-            low, high = np.where(above, w, low), np.where(above, high, w)
-        drop = parameter * low
-        tangent = np.sqrt(drop * (2 - drop)) / (1 - drop)
+        u = filled(_half_drops()(parameter), lambda rows: _half_drop(parameter[rows]))
+        drop = np.square(parameter) * u
+        tangent = parameter * np.sqrt(u * (2 - drop)) / (1 - drop)
         # At m = 1 the lobe is uniform.
         return np.where(parameter < 1, tangent, np.nan)
+
+    def _from_half_tangent(self, tangent: Array) -> Array:
+        # Beyond, m is 1.
+        t = np.minimum(tangent, _LARGEST_TANGENT)
+        z = t / (1 + np.sqrt(1 + np.square(t)))
+        return np.minimum(z * filled(_ratios()(z), lambda rows: _ratio(z[rows])), 1)
 
     def edge(self, parameter: Array) -> Array:
         """Return the end of the support, cos β = 1 − m."""
         return 2 * np.arcsin(np.sqrt(0.5 * parameter))
+
+
+def _half_excess(u: Array, m: Array) -> tuple[Array, Array]:
+    """Return ½ (1 − m w)(1 + (1−m)/m · w (2−w))² − (1 − w), w = m u, and its slope in u.
+
+    It is 0 where 1 − cos β_half = m w.
+    """
+    w = m * u
+    bend = (1 - m) * u * (2 - w) + 1
+    cosine = 1 - m * w
+    half = 0.5 * bend * bend
+    slope = 2 * (1 - m) * cosine * bend * (1 - w) + m * (1 - m * half)
+    return cosine * half - 1 + w, slope
+
+
+def _half_drop(m: Array) -> Array:
+    """Return (1 − cos β_half)/m²."""
+    # A smooth lobe has it near 0.2, a rough one next to the edge at 1/m, where it is 1.
+    low, high = np.full_like(m, 0.1), 1 / np.maximum(m, 0.5)
+    for _ in range(_HALVINGS):
+        u = 0.5 * (low + high)
+        below = _half_excess(u, m)[0] < 0
+        low, high = np.where(below, u, low), np.where(below, high, u)
+    excess, slope = _half_excess(u, m)
+    return u - excess / slope
+
+
+@cache
+def _half_drops() -> PolynomialTable:
+    """Return (1 − cos β_half)/m² as a function of m."""
+    return PolynomialTable(_half_drop, *TO_ROUNDING)
+
+
+def _ratio_excess(ratio: Array, z: Array) -> tuple[Array, Array]:
+    """Return what `_half_excess` does for m = z `ratio` and its slope in the ratio's logarithm.
+
+    z = tan ½β_half; the excess is 0 for the m that has this β_half.
+    """
+    square = np.square(z)
+    m = z * ratio
+    # w = (1 − cos β)/m and w/m
+    w = 2 * z / ((1 + square) * ratio)
+    steep = w / m
+    bend = 1 + (1 - m) * steep * (2 - w)
+    scaled = (1 - square) / (1 + square) * bend
+    slope = scaled * steep * ((2 - w) * (m - 2) + (1 - m) * w) - w
+    return 0.5 * scaled * bend - 1 + w, slope
+
+
+def _ratio(z: Array) -> Array:
+    """Return m/z, between 1 for the uniform lobe and 3.11 for a smooth one."""
+    low, high = np.ones_like(z), np.full_like(z, 3.2)
+    for _ in range(_HALVINGS):
+        ratio = 0.5 * (low + high)
+        above = _ratio_excess(ratio, z)[0] > 0
+        low, high = np.where(above, ratio, low), np.where(above, high, ratio)
+    excess, slope = _ratio_excess(ratio, z)
+    return ratio - ratio * excess / slope
+
+
+@cache
+def _ratios() -> PolynomialTable:
+    """Return m/z, z = tan ½β_half, as a function of z."""
+    return PolynomialTable(_ratio, *TO_ROUNDING)
 
 
 def _sharpen_edge(y: Array, beta: Array, parameter: Array) -> bool:

@@ -15,6 +15,8 @@ from mdfconv.distributions.parameter import Parameter
 
 # tan²β of an angle that no double tells from π/2.
 _LARGEST_SQUARE = 1e34
+# Of a search for β_half: its steps, and how short the last one is, whose square is left.
+_MOST_STEPS, _LAST_STEP = 64, 1e-9
 
 
 def _printed_unit(beta: Any, alpha: Any, gamma: Any) -> Any:
@@ -128,10 +130,28 @@ class StudentT(base.AlphaDistribution):
         x = self._mode_square(parameter) * (inverse_square(parameter) / (self.gamma - 1))
         return 2 * self.gamma * x / (1 + x)
 
+    def _half_tangent(self, parameter: Array) -> Array:
+        # (1+x)^γ = 2 (1+t²)² in y = ln(1+x): γ y = ln 2 + 2 ln(1 + k (e^y − 1)), k = (γ−1) α².
+        # For k ≤ 1 the difference is concave and rises: Newton steps from 0 close in from below.
+        # For more it is convex, and they do from above: from where it were 0 for k e^y in the place
+        # of 1 + k (e^y − 1).
+        k = (self.gamma - 1) * np.square(parameter)
+        y = np.where(k > 1, (np.log(2) + 2 * np.log(k)) / (self.gamma - 2), 0)
+        for _ in range(_MOST_STEPS):
+            rise = k * np.expm1(y)
+            slope = self.gamma - 2 * (rise + k) / (1 + rise)
+            step = (np.log(2) + 2 * np.log(1 + rise) - self.gamma * y) / slope
+            y = y + step
+            arrived = np.abs(step) <= _LAST_STEP * y
+            if arrived.all():
+                break
+        tangent = np.sqrt(k * np.expm1(y))
+        return np.where(arrived & (tangent < np.inf), tangent, np.nan)
+
     def _from_half_tangent(self, tangent: Array) -> Array:
         # (1+x)^γ = 2 (1+t²)²
         square = np.square(tangent)
-        x = np.expm1((np.log(2) + 2 * np.log1p(square)) / self.gamma)
+        x = np.expm1((np.log(2) + 2 * np.log(1 + square)) / self.gamma)
         return tangent / np.sqrt((self.gamma - 1) * x)
 
 

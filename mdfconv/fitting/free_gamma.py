@@ -149,7 +149,9 @@ def fit_free_gamma(
     with np.errstate(all="ignore"):
         parts = [_fit_batch(task, rows) for rows in batches(np.arange(parameter.size), _BATCH)]
     best, gamma, distance = np.concatenate(parts or [np.empty((3, 0))], axis=1)
-    best[~np.isfinite(distance)] = np.nan
+    least, most = source.parameter.held(np.dtype(float))
+    held = (parameter >= least) & (parameter <= most)
+    best[~(held & np.isfinite(distance))] = np.nan
     return FreeFit(best, distance, np.isin(gamma, shape.fit_range), gamma)
 
 

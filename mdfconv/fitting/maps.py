@@ -21,17 +21,19 @@ import numpy as np
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.base import MapVariables
 from mdfconv.distributions.endpoint import follow, to_root
-from mdfconv.distributions.evaluation import Array
+from mdfconv.distributions.evaluation import Array, Indices
+from mdfconv.distributions.table import PolynomialTable, filled
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.problem import ConversionTask
 
 FILE = Path(__file__).parent / "data" / "maps.npz"
-# So many values and their intermediates stay in the cache; fewer would be computed no sooner, and
-# threads would wait for each other between them.
-_BLOCK = 131072
+# So many values and their intermediates stay in the cache.
+_BLOCK = 16384
+# Degree and cells of the tables of maps, and their tolerance, a fifth of what the method promises.
+_TABLE = 2, 1024, 2e-7
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Map:
     """The stored fit of one pair of distributions under one metric.
 
@@ -100,6 +102,7 @@ class StoredFit:
             if stored and self._first.map_variables and last.map_variables:
                 self.map, self.pair = stored, (self._first.name, last.name)
                 self.variables = self._first.map_variables, last.map_variables
+                self._upper = last.parameter.upper
                 if last is target:
                     self._back = ()
                 break
@@ -127,13 +130,22 @@ class StoredFit:
             return follow(self._back, np.minimum(last, self._last.parameter.upper))
         assert self.map is not None, "asked only for what is known"
         source, target = self.variables
-        values = parameter.ravel()
-        fits = np.empty_like(values)
+        stored, values = self.map, parameter.ravel()
+        table, fits = _table(stored, target, self._upper), np.empty_like(values)
         for start in range(0, values.size, _BLOCK):
             block = slice(start, start + _BLOCK)
             x = source.width(follow(self._forward, values[block]))
-            fits[block] = follow(self._back, target.from_map(x, self.map(x)))
-        return fits.reshape(parameter.shape)
+            tabulated = table(x)
+            tabulated *= target.scale(x)
+            np.minimum(tabulated, self._upper, out=tabulated)
+            fits[block] = follow(self._back, tabulated)
+
+        def exact(rows: Indices) -> Array:
+            x = source.width(follow(self._forward, values[rows]))
+            return follow(self._back, target.from_map(x, stored(x)))
+
+        # Together: they are few, and a polynomial of theirs has many steps.
+        return filled(fits, exact).reshape(parameter.shape)
 
     def range_text(self) -> str:
         """Return which parameters of the source the maps cover; "" for all."""
@@ -142,6 +154,18 @@ class StoredFit:
         end = self.variables[0].from_width(np.asarray(self.map.edges[-1]))
         end = follow(self._onward, end)
         return f"{self._symbol} {'≥' if self._above else '≤'} {float(end):.6g}"
+
+
+@cache
+def _table(stored: Map, target: MapVariables, upper: float) -> PolynomialTable:
+    """Return the target's parameter over its scale, as a function of x."""
+
+    def function(x: Array) -> Array:
+        parameter = target.from_map(x, stored(x))
+        # At the end of the legal range the parameter itself is exact.
+        return np.where(parameter < upper, parameter / target.scale(x), np.nan)
+
+    return PolynomialTable(function, *_TABLE, stored.edges[1:])
 
 
 # Where a polynomial is fitted, where it is checked, and how long it may be.

@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from mdfconv.distributions.angles import Angles
+from mdfconv.distributions.elementary import exp_of_product
 from mdfconv.distributions.evaluation import Array, Indices, gauss_legendre, gauss_panels
 
 # Panels from a thousandth of the half width to the horizon, the widest factor between two of
@@ -19,9 +20,12 @@ _TOWARDS_HORIZON = 0.5 * np.pi * (1 - 0.25 ** np.arange(1, 15))
 _ORDER, _SCAN_ORDER = 12, 4
 _SCAN_SAMPLES, _FINE_SAMPLES = 40, 300
 # ln tan β = ln tan β_half + 1.5 sinh s for s in this range: from e⁻¹⁸ of a lobe to within e⁻¹⁸ of
-# the horizon. The trapezoidal rule needs so many nodes, panels so many of the order above.
+# the horizon. The trapezoidal rule needs so many nodes, panels so many of the order above, and with
+# more at kinks fewer.
 _SPREAD, _RANGE = 1.5, (-3.2, 3.2)
 _SMOOTH_NODES, _SMOOTH_PANELS = 76, np.linspace(*_RANGE, 9)
+_LARGEST = _SPREAD * np.sinh(_RANGE[1])
+_PANELS_WITH_KINKS = np.linspace(-2.6, 3.2, 7)
 
 
 def _towards_edge(shrink: float, panels: int) -> Array:
@@ -120,33 +124,49 @@ class SmoothQuadrature:
     def nodes(self, rows: Indices, breaks: Breaks = NO_BREAKS) -> Samples:
         """Return angles and weights, as in the protocol."""
         middle = self._log_tangent[rows]
-        parts: list[Array] = [np.broadcast_to(_SMOOTH_PANELS, (rows.size, _SMOOTH_PANELS.size))]
+        panels = _SMOOTH_PANELS if breaks.kinks is None else _PANELS_WITH_KINKS
+        parts: list[Array] = [np.broadcast_to(panels, (rows.size, panels.size))]
         edges = None
         if breaks.kinks is not None:
-            parts.append(self._variable(breaks.kinks, middle))
+            parts.append(self._variable(breaks.kinks, middle, panels))
         if breaks.edges is not None:
-            edges = self._variable(breaks.edges, middle)
+            edges = self._variable(breaks.edges, middle, panels)
             smooth = breaks.kinks is None and self._root == 1
             shares = _TO_SMOOTH_EDGE if self._root == 1 else _TO_EDGE
             graded = breaks.edges if smooth else _products(breaks.edges, shares)
-            parts.append(self._variable(graded, middle))
+            parts.append(self._variable(graded, middle, panels))
         if len(parts) > 1:
             s, weight = _panels_to_edges(_sorted_panels(*parts), edges, self._root)
         else:
             s = np.linspace(*_RANGE, _SMOOTH_NODES)[None, :]
             weight = np.broadcast_to(s[0, 1] - s[0, 0], s.shape)
-        tangent = np.exp(middle + _SPREAD * np.sinh(s))
-        slope = _SPREAD * np.cosh(s) * tangent / (1 + np.square(tangent))
-        return Angles(tangent=tangent), weight * slope
+        rise = _exponential(s, _RANGE[1])
+        fall = 1 / rise
+        tangent = _exponential((0.5 * _SPREAD) * (rise - fall), _LARGEST)
+        angles = Angles(tangent=np.exp(middle) * tangent)
+        rise += fall
+        rise *= (0.5 * _SPREAD) * weight
+        slope = 1 + angles.tangent_square
+        np.divide(angles.tangent, slope, out=slope)
+        slope *= rise
+        return angles, slope
 
     def coarse(self, rows: Indices, *, fine: bool = False) -> Samples:
         """Return all: there are few."""
         return self.nodes(rows)
 
-    def _variable(self, beta: Array, middle: Array) -> Array:
-        """Return s of angles, within its range; its lower end for 0."""
-        tangent = np.maximum(np.tan(beta), np.exp(middle + _SPREAD * np.sinh(_RANGE[0])))
-        return np.clip(np.arcsinh((np.log(tangent) - middle) / _SPREAD), *_RANGE)
+    def _variable(self, beta: Array, middle: Array, panels: Array) -> Array:
+        """Return s of angles, within the range of panels; its lower end for 0."""
+        tangent = np.maximum(np.tan(beta), np.exp(middle + _SPREAD * np.sinh(panels[0])))
+        return np.clip(np.arcsinh((np.log(tangent) - middle) / _SPREAD), panels[0], panels[-1])
+
+
+def _exponential(values: Array, largest: float) -> Array:
+    """Return the exponential of values up to a largest one."""
+    values = values - largest
+    values = exp_of_product(values, 1.0, out=values)
+    values *= np.exp(largest)
+    return values
 
 
 def _sorted_panels(*ends: Array) -> Array:

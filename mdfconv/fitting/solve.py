@@ -134,6 +134,9 @@ _AS_LOW = 1 + 1e-9
 _CLEARLY_LOWER = 0.98
 # Steps of a descent that do not shrink to this share lead nowhere; the smallest are rounding.
 _MOST_LEFT, _ROUNDING = 0.9, 1e-7
+# Over a shorter step panels that end at a kink may stay, which leaves less than that step. Those
+# that end at an edge may not: there the signal rises steeply.
+_STANDS_STILL = 2e-6
 
 
 def candidates(problem: FitProblem) -> Array:
@@ -296,8 +299,12 @@ def descend(problem: FitProblem, start: Array) -> tuple[Array, Array]:
     A Gauss-Newton step leaves a constant share of the error, a large one where lobes are clipped:
     two of them say where all would lead (Aitken 1926). NaN where they hardly shrink.
     """
-    first, _ = problem.step(np.log(start))
-    second, distance = problem.step(np.log(start) + first)
+    log_start = np.log(start)
+    samples = problem.samples(log_start)
+    first, _ = problem.step(log_start, samples)
+    if problem.target_has_edge or (np.abs(first) > _STANDS_STILL).any():
+        samples = problem.samples(log_start + first)
+    second, distance = problem.step(log_start + first, samples)
     left = second / first
     lost = (np.abs(left) > _MOST_LEFT) & (np.abs(first) > _ROUNDING)
     moved = first + second / (1 - np.where(np.abs(left) <= _MOST_LEFT, left, 0))
@@ -368,11 +375,24 @@ def follow_stored(task: ConversionTask) -> Attempt:
         return Attempt.nothing(task.parameter.size)
     with np.errstate(all="ignore"):
         start = stored(task.parameter)
+    if stored.exact:
+        return Attempt(start, _similar_distances(task, start), ~np.isnan(start))
     steps = path[1:] or path
     if len(steps) > 1:
         steps = [*steps, *[task.metric] * _MORE_DESCENTS]
-    attempt = _follow(task, steps, start)
-    return Attempt(start, attempt.distance, ~np.isnan(start)) if stored.exact else attempt
+    return _follow(task, steps, start)
+
+
+def _similar_distances(task: ConversionTask, fits: Array) -> Array:
+    """Return the distances of fits that are a constant multiple: of similar lobes they are one."""
+    some = np.flatnonzero(fits == task.target.parameter.upper)
+    similar = np.flatnonzero(fits < task.target.parameter.upper)
+    some = np.append(some, similar[:1])
+    distance = np.full(fits.size, np.nan)
+    problem = task.part(some).problem_near(fits[some])
+    distance[some], _ = problem.distance(np.log(fits[some]), np.arange(some.size))
+    distance[similar[1:]] = distance[similar[:1]]
+    return distance
 
 
 def _follow(task: ConversionTask, steps: Sequence[Metric], start: Array) -> Attempt:
@@ -470,7 +490,8 @@ def _follow_to_samples(task: ConversionTask) -> Attempt:
             near, _ = descend(few, near)
         if not accepts(near).all():
             return nothing
-        step, distance = task.problem_near(near).step(np.log(near))
+        problem, log_near = task.problem_near(near), np.log(near)
+        step, distance = problem.step(log_near, problem.samples(log_near))
         best = near * np.exp(step)
         stays = (np.abs(step) <= _LARGEST_FROM_FEW) & accepts(best)
     return Attempt(best, distance, stays) if stays.all() else nothing

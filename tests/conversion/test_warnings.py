@@ -84,7 +84,7 @@ def test_a_result_that_float16_rounds_to_none_is_refused(source, target):
         lambda: fit_table(np.array([1e308]), angle_limit(np.array([1e308])), metric_named("unit")),
         lambda: fit_table(np.array([1e-200]), np.array([1e-200]), metric_named("environment")),
         lambda: fit_table(
-            np.array([1e-150]), np.array([1e-150]), metric_named("display"), extended=True
+            np.array([1e-155]), np.array([1e-155]), metric_named("display"), extended=True
         ),
     ],
 )

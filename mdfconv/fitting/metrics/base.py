@@ -13,6 +13,7 @@ import numpy as np
 
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.angles import Angles
+from mdfconv.distributions.elementary import exp_of_product
 from mdfconv.distributions.evaluation import Array, gauss_panels
 from mdfconv.distributions.parameter import Parameter, number_text, percent_hint
 from mdfconv.errors import MdfconvError
@@ -117,6 +118,10 @@ class Metric(ABC):
         """Return dS/d(D/P)."""
         return 1.0
 
+    def encode_with_slope(self, value: Array) -> tuple[Array, Array | float]:
+        """Return S and dS/d(D/P) for D/P."""
+        return self.encode(value), self.encode_slope(value)
+
     def signal(self, mdf: Distribution, angles: Angles, parameter: Array, peak: Array) -> Array:
         """Return S of a distribution for P = `peak`."""
         with np.errstate(all="ignore"):
@@ -131,8 +136,10 @@ class Metric(ABC):
         value, slope = distribution.with_slope(angles, parameter, normalized=self.normalized)
         if self.normalized:
             value /= peak
-            slope *= self.encode_slope(value) / peak
-        return self.encode(value), slope
+            slope /= peak
+        value, factor = self.encode_with_slope(value)
+        slope *= factor
+        return value, slope
 
 
 class Unit(Metric):
@@ -229,15 +236,28 @@ class Display(Energy):
 
     def encode_slope(self, value: Array) -> Array:
         """Return the slope of the encoding; 0 where it is clipped."""
-        x = np.minimum(self.exposure * value, 1)
-        power = 1.055 / 2.4 * np.maximum(x, _SRGB_TOE) ** (1 / 2.4 - 1)
-        return self.exposure * np.where(x <= _SRGB_TOE, 12.92, np.where(x >= 1, 0, power))
+        return self.encode_with_slope(value)[1]
+
+    def encode_with_slope(self, value: Array) -> tuple[Array, Array]:
+        """Return the encoded value and the slope of the encoding."""
+        linear = self.exposure * value
+        encoded = srgb(linear)
+        # Of a power over its base, which is no smaller than where the curve is linear.
+        slope = (encoded + 0.055) / np.maximum(linear, _SRGB_TOE)
+        slope *= self.exposure / 2.4
+        slope = np.where(linear <= _SRGB_TOE, 12.92 * self.exposure, slope)
+        slope *= linear < 1
+        return encoded, slope
 
 
 def srgb(linear: Array) -> Array:
     """Return linear light in the sRGB encoding, clipped to [0, 1] (IEC 61966-2-1)."""
-    x = np.clip(linear, 0, 1)
-    return np.where(x <= _SRGB_TOE, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+    x = np.clip(np.atleast_1d(linear), 0, 1)
+    power = np.log(np.maximum(x, _SRGB_TOE))
+    power = exp_of_product(power, 1 / 2.4, out=power)
+    power *= 1.055
+    power -= 0.055
+    return np.where(x <= _SRGB_TOE, 12.92 * x, power).reshape(np.shape(linear))
 
 
 # The ratio of two parameters is found on ln tan β from −32 to 32: beyond, the shares of any two

@@ -545,7 +545,7 @@ def _in_blocks(beta: Array) -> list[Angles]:
 
 
 def _lobes(
-    mdf: Distribution, angles: Sequence[Angles], parameters: Array, *, normalized: bool
+    mdf: Distribution, angles: list[Angles], parameters: Array, *, normalized: bool
 ) -> Array:
     """Return lobes of parameters, shape (m,), at angles in parts, shape (m, n)."""
     column = parameters[:, None]

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdfconv.distributions import Distribution
-from mdfconv.distributions.base import Variable
 from mdfconv.distributions.endpoint import follow, to_root
 from mdfconv.distributions.evaluation import Array
 from mdfconv.errors import MdfconvError
@@ -130,26 +129,21 @@ class Microsurface:
         for value in _pair(self.parameter):
             self.distribution.parameter.check_one(value, self.distribution.label)
 
-    def at_angle(self, theta: Array, phi: Array | None = None) -> Array:
-        """Return D at angles from the surface normal, [0, π/2], and azimuths if it has a pair."""
-        return self._at(theta, phi, "angle")
+    def at_slope(self, slope: Array, phi: Array | None = None) -> Array:
+        """Return D at tangents of angles from the normal, and azimuths if it has a pair."""
+        form = self.distribution.normalized if self.normalized else self.distribution.unit
+        return np.asarray(form(slope, self.parameter, phi=phi, variable="slope"))
 
     def density(self, m: Array) -> Array:
         """Return D at microfacet normals, shape (..., 3); 0 below the surface."""
+        return np.where(m[..., 2] > 0, self.at_slope(*self.slopes(m)), 0)
+
+    def slopes(self, m: Array) -> tuple[Array, ...]:
+        """Return the slopes of normals for `at_slope`; the horizon's for what is none or below."""
         x, y, z = np.moveaxis(m, -1, 0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            slope = np.where(z > 0, np.hypot(x, y) / z, np.inf)
-        phi = azimuth(m) if isinstance(self.parameter, tuple) else None
-        return np.where(z > 0, self._at(slope, phi, "slope"), 0)
-
-    def _at(self, angles: Array, phi: Array | None, variable: Variable) -> Array:
-        form = self.distribution.normalized if self.normalized else self.distribution.unit
-        return np.asarray(form(angles, self.parameter, phi=phi, variable=variable))
-
-    def angles(self, m: Array) -> tuple[Array, ...]:
-        """Return the angles of normals for `at_angle`; the horizon for what is none or below."""
-        theta = np.fmin(polar_angle(m), np.pi / 2)
-        return (theta, azimuth(m)) if isinstance(self.parameter, tuple) else (theta,)
+        slope = np.full(z.shape, np.inf)
+        np.divide(np.sqrt(x * x + y * y), z, out=slope, where=z > 0)
+        return (slope, azimuth(m)) if isinstance(self.parameter, tuple) else (slope,)
 
     def smith_lambda(self, omega: Array) -> Array:
         """Return Smith's Λ for directions.

@@ -30,8 +30,8 @@ _LARGEST_RECURRENCE = 1e5
 class LobeBrdf:
     """A BRDF that is a lobe times a factor.
 
-    `parts` takes (light, view) to the angles at which the lobe is taken, θ or (θ, φ), and to the
-    factor, which is 0 where either is not above the surface.
+    `parts` takes (light, view) to where the lobe is taken, tan θ or (tan θ, φ), and to the factor,
+    which is 0 where either is not above the surface.
     """
 
     lobe: Callable[..., Array]
@@ -39,8 +39,8 @@ class LobeBrdf:
 
     def __call__(self, light: Array, view: Array) -> Array:
         """Return the BRDF as `Brdf` has it."""
-        angles, factor = self.parts(light, view)
-        return self.lobe(*angles) * factor
+        places, factor = self.parts(light, view)
+        return self.lobe(*places) * factor
 
 
 # Steps of the table: a smooth lobe up to five times as wide or as narrow keeps 1e-7 of its peak.
@@ -51,8 +51,8 @@ class BrdfSet:
     """BRDFs that differ in their lobes alone, in one picture.
 
     For many samples of light the lobes are interpolated by cubics between equal steps of
-    θ/(θ + width). What the samples send is a sum over nodes, whose weights all lobes share: another
-    lobe costs next to nothing.
+    t/(t + width), t = tan θ. What the samples send is a sum over nodes, whose weights all lobes
+    share: another lobe costs next to nothing.
 
     Parameters
     ----------
@@ -66,16 +66,13 @@ class BrdfSet:
         self._parts = brdfs[0].parts
         self._lobes = [brdf.lobe for brdf in brdfs]
         self._width = width
-        self._scale = _STEPS * (1 + width / (np.pi / 2))
 
     @cached_property
     def _table(self) -> Array:
         """The lobes at the nodes, shape (nodes, k)."""
-        step = np.arange(_STEPS + 1)
-        # The last one is at π/2, of however narrow lobes.
-        angle = self._width * step / (_STEPS - step + _STEPS * self._width / (np.pi / 2))
-        angle = np.minimum(angle, np.pi / 2)
-        return np.stack([lobe(angle) for lobe in self._lobes], axis=-1)
+        step = np.arange(_STEPS)
+        slope = np.append(self._width * step / (_STEPS - step), np.inf)
+        return np.stack([lobe(slope) for lobe in self._lobes], axis=-1)
 
     def reflected(self, light: Array, view: Array, brought: Array) -> Array:
         """Return what s samples of light for each of m surfaces send to the viewer.
@@ -92,19 +89,20 @@ class BrdfSet:
         numpy.ndarray, shape (k, m), or (k, 3, m) in colour
             The radiance.
         """
-        (angle,), factor = self._parts(light, view)
+        (slope,), factor = self._parts(light, view)
         channels = np.atleast_2d(factor * brought.ravel())
         if brought.shape[1] == 1:
-            sent = np.stack([lobe(angle) for lobe in self._lobes])[:, None] * channels
+            sent = np.stack([lobe(slope) for lobe in self._lobes])[:, None] * channels
         else:
-            sent = np.stack([self._sums(angle, weight, brought.shape) for weight in channels], 1)
+            sent = np.stack([self._sums(slope, weight, brought.shape) for weight in channels], 1)
         return sent if factor.ndim > 1 else sent[:, 0]
 
-    def _sums(self, angle: Array, weight: Array, shape: tuple[int, int]) -> Array:
+    def _sums(self, slope: Array, weight: Array, shape: tuple[int, int]) -> Array:
         """Return the sums over samples of weights times lobes, shape (k, m)."""
         from scipy.sparse import csr_array
 
-        place = angle * (self._scale / (angle + self._width))
+        with np.errstate(divide="ignore"):
+            place = _STEPS / (1 + self._width / slope)
         node = np.clip(place.astype(np.int32), 1, _STEPS - 2)
         a = place - node
         b, c, d = a + 1, a - 1, a - 2
@@ -119,18 +117,20 @@ class BrdfSet:
 def around_mirror(
     lobe: Callable[[Array], Array], factor: Callable[[Array], Array | float]
 ) -> LobeBrdf:
-    """Return the BRDF lobe(θ_r) factor(n·v) for θ_r < π/2.
+    """Return the BRDF lobe(tan θ_r) factor(n·v) for θ_r < π/2.
 
     A lobe with long tails ends with an edge. The factor is the Fresnel term, or what normalizes
     the lobe.
     """
 
     def parts(light: Array, view: Array) -> tuple[tuple[Array], Array]:
-        # By the chord: an arccos loses its digits near 0.
+        # By the chord, 2 sin ½θ_r: a cosine loses its digits near 0.
         chord = np.linalg.norm(light - mirrored(view), axis=-1)
-        angle = 2 * np.arcsin(np.minimum(0.5 * chord, 1))
-        lit = above(light, view) & (angle < 0.5 * np.pi)
-        return (np.where(lit, angle, 0),), lit * factor(np.maximum(view[..., 2], 0))
+        half = np.square(np.minimum(0.5 * chord, 1))
+        lit = above(light, view) & (half < 0.5)
+        half = np.where(lit, half, 0)
+        slope = 2 * np.sqrt(half * (1 - half)) / (1 - 2 * half)
+        return (slope,), lit * factor(np.maximum(view[..., 2], 0))
 
     return LobeBrdf(lobe, parts)
 
@@ -165,11 +165,10 @@ def modified(exponent: float, normalizer: str = "usual") -> Brdf:
 
 
 def _cosine_power(exponent: float) -> Callable[[Array], Array]:
-    """Return cos^γ of an angle below π/2, with its digits near 0."""
+    """Return cos^γ of the tangent of an angle below π/2, with its digits near 0."""
     if not 0 <= exponent < np.inf:
         raise MdfconvError(f"Phong's exponent is at least 0, not {exponent:g}")
-    # cos θ = 1 − 2 sin²(θ/2)
-    return lambda angle: np.exp(exponent * np.log1p(-2 * np.square(np.sin(0.5 * angle))))
+    return lambda slope: np.exp(-0.5 * exponent * np.log1p(np.square(slope)))
 
 
 def usual(cosine: Array, exponent: float) -> Array:
@@ -284,9 +283,11 @@ def smoothie_approx(surface: Microsurface, fresnel: Fresnel) -> LobeBrdf:
     def parts(light: Array, view: Array) -> tuple[tuple[Array], Array]:
         h = light + view
         sine = np.minimum(0.5 * np.hypot(h[..., 0], h[..., 1]), 1)
-        return (np.arcsin(sine),), 0.25 * above(light, view) * fresnel(_half_length(h))
+        with np.errstate(divide="ignore"):
+            slope = sine / np.sqrt((1 - sine) * (1 + sine))
+        return (slope,), 0.25 * above(light, view) * fresnel(_half_length(h))
 
-    return LobeBrdf(surface.at_angle, parts)
+    return LobeBrdf(surface.at_slope, parts)
 
 
 def modified_phong(surface: Microsurface, fresnel: Fresnel) -> LobeBrdf:
@@ -296,7 +297,7 @@ def modified_phong(surface: Microsurface, fresnel: Fresnel) -> LobeBrdf:
     normalized D, N = γ, at θ_r for β: any other D will do, and a normalized one reflects
     all energy to a viewer along the normal.
     """
-    return around_mirror(surface.at_angle, fresnel)
+    return around_mirror(surface.at_slope, fresnel)
 
 
 def _from_half_vectors(surface: Microsurface, fresnel: Fresnel, geometry: _Geometry) -> LobeBrdf:
@@ -310,9 +311,9 @@ def _from_half_vectors(surface: Microsurface, fresnel: Fresnel, geometry: _Geome
         with np.errstate(divide="ignore", invalid="ignore"):
             m = h / (2 * cosine[..., None])
             factor = np.where(above(light, view), geometry(light, view, m, cosine), 0)
-        return surface.angles(m), factor * fresnel(cosine)
+        return surface.slopes(m), factor * fresnel(cosine)
 
-    return LobeBrdf(surface.at_angle, parts)
+    return LobeBrdf(surface.at_slope, parts)
 
 
 def _half_length(h: Array) -> Array:

@@ -630,8 +630,7 @@ class Distribution(ABC):
         return float(np.log(lower)), float(np.log(min(self.parameter.upper, 1 / _SMALLEST_ANGLE)))
 
     def _legal(self, parameter: Any) -> Any:
-        legal = self.parameter.accepts(parameter)
-        return parameter if legal.all() else np.where(legal, parameter, np.nan)[()]
+        return self.parameter.only_accepted(np.asarray(parameter))[()]
 
     def _evaluate(
         self,

@@ -71,24 +71,22 @@ class Endpoint:
 
     def decode_legal(self, values: Array) -> Array:
         """Return the parameters for stored values (float64); NaN for those that are illegal."""
-        legal = self.stored.accepts(values)
-        if self.encoding:
-            legal &= ~self.encoding.clamped(values)
-        values = values if legal.all() else np.where(legal, values, np.nan)
+        values = self.stored.only_accepted(values)
         if not self.encoding:
             return values
+        clamped = self.encoding.clamped(values)
+        values = np.where(clamped, np.nan, values) if clamped.any() else values
         with np.errstate(all="ignore"):
-            parameter = self.encoding.decode(values)
-        return np.where(self.distribution.parameter.accepts(parameter), parameter, np.nan)
+            return self.distribution.parameter.only_accepted(self.encoding.decode(values))
 
     def encode(self, parameter: Array) -> Array:
         """Return the stored values for parameters; NaN for what is illegal or cannot be stored."""
+        if not self.encoding:
+            return self.distribution.parameter.only_accepted(parameter)
+        with np.errstate(all="ignore"):
+            stored = self.encoding.encode(parameter)
         legal = self.distribution.parameter.accepts(parameter)
-        stored = parameter
-        if self.encoding:
-            with np.errstate(all="ignore"):
-                stored = self.encoding.encode(parameter)
-            legal = legal & (self.stored.accepts(stored) | self.encoding.clamped(stored))
+        legal = legal & (self.stored.accepts(stored) | self.encoding.clamped(stored))
         return stored if legal.all() else np.where(legal, stored, np.nan)
 
     def encode_one(self, parameter: float) -> tuple[float | None, float | None]:

@@ -88,6 +88,13 @@ class Parameter:
         with np.errstate(over="ignore"):
             return above(values, self.lower) & below(values, self.upper) & (values < np.inf)
 
+    def only_accepted(self, values: Array) -> Array:
+        """Return values, NaN where they are illegal; the array itself where all are legal."""
+        # Two reductions need no memory; NaN fails both comparisons.
+        if values.size and self.accepts(values.min()) and self.accepts(values.max()):
+            return values
+        return np.where(self.accepts(values), values, np.nan)
+
     def held(self, dtype: np.dtype[Any]) -> tuple[float, float]:
         """Return between which values a lobe is one in a type of floats.
 

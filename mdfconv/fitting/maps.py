@@ -27,8 +27,9 @@ from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.problem import ConversionTask
 
 FILE = Path(__file__).parent / "data" / "maps.npz"
-# So many values and their intermediates stay in the cache.
-_BLOCK = 16384
+# So many values and their intermediates stay in the cache; with fewer, threads would wait for each
+# other between the operations.
+_BLOCK = 131072
 # Degree and cells of the tables of maps, and their tolerance, a fifth of what the method promises.
 _TABLE = 2, 1024, 2e-7
 

@@ -216,7 +216,7 @@ FORMS: Sequence[Law] = (
     Law("blinn-phong", "ggx", "C = a/√(N+b)", lambda x, a, b: a / np.sqrt(x + b), (1.697, 4.5)),
 )  # fmt: skip
 
-_DECIMALS = 9
+_DECIMALS = 7
 _SOURCES = {_SOURCE: "m_b"} | {name: column for column, name in FITTED.items()}
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -11,12 +13,15 @@ from mdfconv.distributions.base import Distribution, MapVariables, Printed
 from mdfconv.distributions.elementary import exp_of_product
 from mdfconv.distributions.evaluation import Array, gauss_legendre, inverse_square
 from mdfconv.distributions.parameter import Parameter
+from mdfconv.distributions.table import TO_ROUNDING, PolynomialTable, filled
 
 _NODES = 80
 # π/2 is this beyond its double.
 _HALF_PI_REST = 6.123233995736766e-17
 # From this m on a lobe is nearly uniform, and a few nodes integrate it exactly.
 _WIDE, _WIDE_NODES = 4.0, 16
+# Below this square of m a lobe is as one that has it.
+_LEAST_SQUARE = 1e-16
 # Nodes for e^(−v) times a smooth function up to v = 50, from where on it is nothing.
 _LONGEST, _CUMULATIVE_NODES = 50.0, 64
 
@@ -33,13 +38,10 @@ class Gauss(Distribution):
 
         D̄ = e^(−β²/m²),   C_TS = 1/m.
 
-    Normalized by 1/(π Z), Z = ∫ e^(−β²/m²) sin 2β dβ over [0, π/2]. Completing the square
-    gives Z through the Faddeeva function w::
-
-        Z = ½ √π m Im[ w(m) + e^(−π²/4m²) w(m + iπ/2m) ].
-
-    The same substitution gives the cumulative distribution, but as a difference; here F and 1 − F
-    are integrals of e^(−u/m²) sin(2√u)/(2√u) over u = β², which have positive terms only.
+    Normalized by 1/(π Z), Z = ∫ e^(−β²/m²) sin 2β dβ over [0, π/2]. Completing the square gives Z
+    and the cumulative distribution through the Faddeeva function, but the latter as a difference;
+    here F and 1 − F are integrals of e^(−u/m²) sin(2√u)/(2√u) over u = β², which have positive
+    terms only.
 
     Sawicki 2021 (Table 1) uses another constant, borrowed from Blinn/Phong at equal half angle:
     with it ∫ D cos β dω is 1.0005 at m_G = 0.05, 1.008 at 0.2, 1.027 at 0.4, 1.045 at 0.7.
@@ -76,7 +78,7 @@ class Gauss(Distribution):
 
     def _log_slope_at_normal(self, parameter: Array) -> Array:
         # −∂ ln Z/∂ ln m as a mean: differences of Faddeeva functions cancel for large m.
-        return -2 * _mean_square(parameter) / np.square(parameter)
+        return -2 * _of_square(_mean_square, parameter, scaled=False) / (1 + np.square(parameter))
 
     def _cumulative(self, angles: Angles, parameter: Array) -> tuple[Array, Array]:
         # The whole integral is the longer of the two parts plus the other.
@@ -137,12 +139,27 @@ class Gauss(Distribution):
 
 def _sine_integral(parameter: Array) -> Array:
     """Return ∫ e^(−β²/m²) sin 2β dβ over [0, π/2]."""
-    from scipy.special import wofz
+    return _of_square(_mass, parameter, scaled=True)
 
-    width = np.asarray(parameter, dtype=float)
-    tail = np.exp(-np.square(np.pi / (2 * width)))
-    faddeeva = wofz(width) + tail * wofz(width + 1j * np.pi / (2 * width))
-    return (0.5 * np.sqrt(np.pi) * width * faddeeva.imag).astype(parameter.dtype)
+
+def _of_square(function: Callable[[Array], Array], parameter: Array, *, scaled: bool) -> Array:
+    """Return a function of m that is about m² for a smooth lobe; or that over x = m²/(1 + m²)."""
+    with np.errstate(all="ignore"):
+        x = np.ravel(1 / (1 + 1 / np.square(np.asarray(parameter, dtype=float))))
+        ratio = filled(_table(function)(x), lambda rows: _ratio(function, x[rows]))
+        value = ratio * x if scaled else ratio
+    return value.astype(parameter.dtype).reshape(parameter.shape)[()]
+
+
+@cache
+def _table(function: Callable[[Array], Array]) -> PolynomialTable:
+    """Return a function of m over x = m²/(1 + m²), as a function of x."""
+    return PolynomialTable(partial(_ratio, function), *TO_ROUNDING)
+
+
+def _ratio(function: Callable[[Array], Array], x: Array) -> Array:
+    x = np.maximum(x, _LEAST_SQUARE)
+    return function(np.sqrt(x / (1 - x))) / x
 
 
 def _slab_integral(start: Array, length: Array, to_horizon: Array, m: Array) -> Array:
@@ -162,14 +179,26 @@ def _slab_integral(start: Array, length: Array, to_horizon: Array, m: Array) -> 
     return np.exp(-np.square(start / m)) * np.sum(span * weight * mass, axis=-1)
 
 
+def _mass(parameter: Array) -> Array:
+    """Return ∫ e^(−β²/m²) sin 2β dβ over [0, π/2]."""
+    return _weighted(parameter)[0]
+
+
 def _mean_square(parameter: Array) -> Array:
     """Return the mean of β² under the weight e^(−β²/m²) sin 2β on [0, π/2]."""
+    mass, moment = _weighted(parameter)
+    return moment / mass
+
+
+def _weighted(parameter: Array) -> tuple[Array, Array]:
+    """Return ∫ of the weight e^(−β²/m²) sin 2β over [0, π/2], and of β² times it."""
     x, weight = gauss_legendre(_NODES)
     # Beyond 12 m, or π/2, the weight is nothing.
     reach = np.minimum(12 * parameter[..., None], 0.5 * np.pi)
     beta = 0.5 * reach * (1 + x)
-    mass = weight * np.sin(2 * beta) * np.exp(-np.square(beta / parameter[..., None]))
-    return np.sum(mass * np.square(beta), axis=-1) / np.sum(mass, axis=-1)
+    mass = np.sin(2 * beta) * np.exp(-np.square(beta / parameter[..., None]))
+    mass *= 0.5 * reach * weight
+    return np.sum(mass, axis=-1), np.sum(mass * np.square(beta), axis=-1)
 
 
 DISTRIBUTIONS = (Gauss(),)

@@ -26,7 +26,7 @@ Kernel: TypeAlias = Callable[..., Any]
 
 # Large enough to hide the cost of a call, small enough for the intermediates to stay in cache; no
 # power of 2, which would put the same elements of all arrays into the same lines of the cache.
-_BLOCK = 100_000
+_BLOCK = 90_000
 # The GNU C library returns large blocks to the system, and fresh pages cost more than what is
 # computed in them. Once a block has been freed, of 31 MB at most, it keeps twice as much. This one
 # is never touched.

@@ -176,7 +176,8 @@ def _fit_batch(task: ConversionTask, rows: Indices) -> Array:
             gamma[at_end] = end
             problem = task._replace(target=target.with_gamma(end)).problem(rows[at_end])
             best[at_end], distance[at_end] = descend(problem, best[at_end])
-    return np.stack([best, gamma, distance])
+    # A step or an exponential may round beyond the end of a closed range.
+    return np.stack([np.minimum(best, target.parameter.upper), gamma, distance])
 
 
 def _start(task: ConversionTask, rows: Indices) -> Array:

@@ -124,7 +124,8 @@ class SmoothQuadrature:
     def nodes(self, rows: Indices, breaks: Breaks = NO_BREAKS) -> Samples:
         """Return angles and weights, as in the protocol."""
         middle = self._log_tangent[rows]
-        panels = _SMOOTH_PANELS if breaks.kinks is None else _PANELS_WITH_KINKS
+        few = breaks.kinks is not None and breaks.edges is None
+        panels = _PANELS_WITH_KINKS if few else _SMOOTH_PANELS
         parts: list[Array] = [np.broadcast_to(panels, (rows.size, panels.size))]
         edges = None
         if breaks.kinks is not None:

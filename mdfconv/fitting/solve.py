@@ -385,12 +385,14 @@ def follow_stored(task: ConversionTask) -> Attempt:
 
 def _similar_distances(task: ConversionTask, fits: Array) -> Array:
     """Return the distances of fits that are a constant multiple: of similar lobes they are one."""
-    some = np.flatnonzero(fits == task.target.parameter.upper)
-    similar = np.flatnonzero(fits < task.target.parameter.upper)
+    limits = task.target.parameter
+    some = np.flatnonzero(limits.accepts(fits) & (fits == limits.upper))
+    similar = np.flatnonzero(fits < limits.upper)
     some = np.append(some, similar[:1])
     distance = np.full(fits.size, np.nan)
-    problem = task.part(some).problem_near(fits[some])
-    distance[some], _ = problem.distance(np.log(fits[some]), np.arange(some.size))
+    if some.size:
+        problem = task.part(some).problem_near(fits[some])
+        distance[some], _ = problem.distance(np.log(fits[some]), np.arange(some.size))
     distance[similar[1:]] = distance[similar[:1]]
     return distance
 

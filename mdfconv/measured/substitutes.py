@@ -110,11 +110,11 @@ class ScenePicture(Display):
         """Return what the light adds to the picture."""
         return srgb(_AMBIENT + self.exposure * value) - srgb(np.array(_AMBIENT))
 
-    def encode_slope(self, value: Array) -> Array:
-        """Return its slope; 0 where it is clipped."""
+    def encode_with_slope(self, value: Array) -> tuple[Array, Array]:
+        """Return that and its slope, 0 where it is clipped."""
         x = _AMBIENT + self.exposure * value
         power = 1.055 / 2.4 * np.minimum(x, 1) ** (1 / 2.4 - 1)
-        return self.exposure * np.where(x < 1, power, 0)
+        return self.encode(value), self.exposure * np.where(x < 1, power, 0)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import os
 import tempfile
+import warnings
 from typing import Any
 
 from mdfconv.distributions import list_distributions
@@ -67,7 +68,10 @@ def encoded(figure: Any, form: str = "png", dpi: int = 150) -> bytes:
         options = _PNG
         # Matplotlib would draw it unseen first, to lay it out.
         figure.set_dpi(dpi)
-        figure.get_layout_engine().execute(figure)
+        with warnings.catch_warnings():
+            # Of a picture that is too small for it.
+            warnings.simplefilter("ignore")
+            figure.get_layout_engine().execute(figure)
         figure.set_layout_engine(None)
     figure.savefig(buffer, format=form, dpi=dpi, **options)
     return buffer.getvalue()

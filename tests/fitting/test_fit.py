@@ -389,3 +389,22 @@ def test_the_fit_is_smooth_where_its_search_is_hard(source, target, x):
     ends = mdfconv.distribution(source), mdfconv.distribution(target)
     got = fit(ends[0], around, ends[1], Unit()).parameter
     assert abs(np.diff(got, 4)[0]) < 5e-8
+
+
+@pytest.mark.parametrize(
+    ("value", "metric", "result"),
+    [(0.1234, "display:4", 0.143807649), (0.1234, "display", 0.1301773675)],
+)
+def test_a_clipped_lobe_and_one_with_an_edge(value, metric, result):
+    # By a quadrature of 1.5 million angles and a parabola through the least distances.
+    converted = mdfconv.convert(value, "ggx", "schlick", "fit", metric=metric)
+    assert converted == pytest.approx(result, rel=5e-8)
+
+
+def test_a_free_gamma_at_the_end_of_the_range():
+    assert mdfconv.convert(1.0, "ggx", "gtr", gamma="free") == (1.0, 0.25)
+
+
+def test_a_constant_that_leads_to_infinity_is_refused_in_terms_of_the_source():
+    with pytest.raises(mdfconv.MdfconvError, match="for beckmann m_B = 1.5 fit gives smoothie"):
+        mdfconv.convert(1.5, "beckmann", "smoothie", "fit", metric="environment")

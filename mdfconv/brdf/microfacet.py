@@ -139,7 +139,7 @@ class Microsurface:
         return np.where(m[..., 2] > 0, self.at_slope(*self.slopes(m)), 0)
 
     def slopes(self, m: Array) -> tuple[Array, ...]:
-        """Return the slopes of normals for `at_slope`; the horizon's for what is none or below."""
+        """Return the slopes of normals for `at_slope`, infinite for one that is not above."""
         x, y, z = np.moveaxis(m, -1, 0)
         slope = np.full(z.shape, np.inf)
         np.divide(np.sqrt(x * x + y * y), z, out=slope, where=z > 0)

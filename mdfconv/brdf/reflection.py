@@ -57,7 +57,7 @@ class BrdfSet:
     Parameters
     ----------
     brdfs : sequence of LobeBrdf
-        The k BRDFs, isotropic, the same but for the lobes.
+        The k BRDFs. They are isotropic and differ only in their lobes.
     width : float
         About the half width of the lobes, radians.
     """

@@ -14,7 +14,7 @@ import numpy as np
 
 from mdfconv.distributions import Distribution
 from mdfconv.distributions.endpoint import Endpoint, ParameterMap, follow, to_root
-from mdfconv.distributions.evaluation import Array, Mask
+from mdfconv.distributions.evaluation import Array, Mask, by_blocks
 from mdfconv.distributions.parameter import number_text
 from mdfconv.errors import MdfconvError
 from mdfconv.fitting.maps import StoredFit, made_map
@@ -231,13 +231,11 @@ class HalfAngle(Method):
 
     def convert(self, task: ConversionTask) -> Array:
         """Go through tan β_half; NaN where a distribution never falls to one half."""
-        values = task.parameter.ravel()
-        result = np.empty_like(values)
-        for start in range(0, values.size, _BLOCK):
-            block = slice(start, start + _BLOCK)
-            tangent = task.source.half_tangent(values[block])
-            result[block] = task.target.from_half_tangent(tangent)
-        return result.reshape(task.parameter.shape)
+
+        def converted(parameter: Array) -> Array:
+            return np.asarray(task.target.from_half_tangent(task.source.half_tangent(parameter)))
+
+        return by_blocks(converted, task.parameter, _BLOCK)
 
 
 class Ward(FormulaMethod):

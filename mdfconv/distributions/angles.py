@@ -40,7 +40,7 @@ class Angles:
 
     @classmethod
     def of_cosine(cls, cosine: Array) -> Self:
-        """Return those of any cos β, of which 1 may be exceeded by rounding."""
+        """Return the angles of any cos β; what rounding makes larger than 1 is taken as 1."""
         angles, bounded = cls(), np.minimum(cosine, 1)
         square = (1 - bounded) * (1 + bounded) / np.square(bounded)
         angles.__dict__ |= {"tangent_square": _bounded(square), "versine": 1 - bounded}
@@ -49,7 +49,7 @@ class Angles:
 
     @classmethod
     def of_slope(cls, slope: Array) -> Self:
-        """Return those of any tan β, infinite at π/2."""
+        """Return the angles of any tan β, which is infinite at π/2."""
         angles = cls(tangent=np.abs(slope))
         angles.__dict__["tangent_square"] = _bounded(np.square(slope))
         return angles

@@ -112,9 +112,10 @@ def cosine(beta: Array, versine: Array) -> tuple[Array, Mask]:
 
 
 def minus_log_of_difference(difference: Array, one_less: Array, near: Mask | None) -> Array:
-    """Return −ln d for d and 1 − d, of which d has all digits where it is `near` 0, else 1 − d.
+    """Return −ln d from d and 1 − d.
 
-    As `log1p` of −(1 − d), within 3 units in the last place.
+    Where it is `near` 0, d has all its digits; elsewhere 1 − d has. The method is that of `log1p`,
+    and the error within 3 units in the last place.
     """
     lost = _TYPES[difference.dtype].one - difference
     lost -= one_less
@@ -142,9 +143,10 @@ def log1p(values: Array) -> Array:
 
 
 def exp_of_product(values: Array, factor: Any, out: Array | None = None) -> Array:
-    """Return e^(x y) for x y ≤ 0, within 2 units in the last place but for the product's rounding.
+    """Return e^(x y) for x y ≤ 0.
 
-    The product's rounding is relative: where x y is −700 it is 700 units of the result.
+    The error is 2 units in the last place, and what the rounding of the product adds. That is
+    relative: where x y is −700 it adds up to 700 units.
 
     Parameters
     ----------

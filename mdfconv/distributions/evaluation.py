@@ -153,6 +153,19 @@ def in_parts(run: Callable[[int, int], None], size: int, threads: int) -> None:
         list(pool.map(run, ends[:-1], ends[1:]))
 
 
+def by_blocks(function: Kernel, values: Array, size: int) -> Array:
+    """Return a float64 function of values, computed so many at a time, in their shape.
+
+    `function` returns an array, shape (n,), for one.
+    """
+    flat = np.ravel(values)
+    result = np.empty(flat.size)
+    for start in range(0, flat.size, size):
+        block = slice(start, start + size)
+        result[block] = function(flat[block])
+    return result.reshape(np.shape(values))
+
+
 def inverse_square(values: Array) -> Array:
     """Return 1/values², finite even where values² underflows, so that 0 times it is 0.
 

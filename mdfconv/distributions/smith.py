@@ -20,7 +20,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from mdfconv.distributions.angles import Angles
-from mdfconv.distributions.evaluation import Array, Kernel, gauss_legendre
+from mdfconv.distributions.evaluation import Array, Kernel, by_blocks, gauss_legendre
 
 # The length of a panel in u, and the nodes on it.
 _PANEL, _NODES = 0.45, 10
@@ -49,13 +49,8 @@ class SmithTable(NamedTuple):
 
     def __call__(self, tangent: Array) -> Array:
         """Return Λ for tan θ ≥ 0."""
-        flat = np.ravel(tangent)
-        value = np.empty(flat.size)
         with np.errstate(all="ignore"):
-            for start in range(0, flat.size, _BLOCK):
-                block = slice(start, start + _BLOCK)
-                value[block] = self._block(flat[block])
-        return value.reshape(np.shape(tangent))
+            return by_blocks(self._block, tangent, _BLOCK)
 
     def _block(self, tangent: Array) -> Array:
         place = (np.log(tangent) + self.top) * (1 / _PANEL)

@@ -21,7 +21,7 @@ import numpy as np
 from mdfconv.distributions import Distribution, distribution
 from mdfconv.distributions.base import MapVariables
 from mdfconv.distributions.endpoint import follow, to_root
-from mdfconv.distributions.evaluation import Array, Indices
+from mdfconv.distributions.evaluation import Array, Indices, by_blocks
 from mdfconv.distributions.table import PolynomialTable, filled
 from mdfconv.fitting.metrics import Metric, metric_named
 from mdfconv.fitting.problem import ConversionTask
@@ -132,21 +132,21 @@ class StoredFit:
         assert self.map is not None, "asked only for what is known"
         source, target = self.variables
         stored, values = self.map, parameter.ravel()
-        table, fits = _table(stored, target, self._upper), np.empty_like(values)
-        for start in range(0, values.size, _BLOCK):
-            block = slice(start, start + _BLOCK)
-            x = source.width(follow(self._forward, values[block]))
-            tabulated = table(x)
-            tabulated *= target.scale(x)
-            np.minimum(tabulated, self._upper, out=tabulated)
-            fits[block] = follow(self._back, tabulated)
+        table = _table(stored, target, self._upper)
+
+        def tabulated(values: Array) -> Array:
+            x = source.width(follow(self._forward, values))
+            fits = table(x)
+            fits *= target.scale(x)
+            np.minimum(fits, self._upper, out=fits)
+            return follow(self._back, fits)
 
         def exact(rows: Indices) -> Array:
             x = source.width(follow(self._forward, values[rows]))
             return follow(self._back, target.from_map(x, stored(x)))
 
         # Together: they are few, and a polynomial of theirs has many steps.
-        return filled(fits, exact).reshape(parameter.shape)
+        return filled(by_blocks(tabulated, values, _BLOCK), exact).reshape(parameter.shape)
 
     def range_text(self) -> str:
         """Return which parameters of the source the maps cover; "" for all."""

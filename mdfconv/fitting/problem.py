@@ -92,6 +92,11 @@ class ConversionTask(NamedTuple):
     metric: Metric
     quadrature: Quadrature | None = None
 
+    @property
+    def target_has_edge(self) -> bool:
+        """Whether the target is 0 beyond an angle, which moves with its parameter."""
+        return self.target.edge(np.ones(1)) is not None
+
     def part(self, rows: Indices | Mask) -> ConversionTask:
         """Return the task for some of the lobes; not for one with a quadrature of its own."""
         return self._replace(parameter=self.parameter[rows])
@@ -133,7 +138,7 @@ class FitProblem:
         self._source_breaks = self._breaks(source, self._source_parameter, self._peak, self.tangent)
         # Unless the panels move with the target, all distances share their samples.
         self._samples: Sampled | None = None
-        self.target_has_edge = self.target.edge(np.ones(1)) is not None
+        self.target_has_edge = task.target_has_edge
         if not self.metric.kinks and not self.target_has_edge:
             self._samples = self._sampled(self._all, self._source_breaks)
 

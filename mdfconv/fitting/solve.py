@@ -399,7 +399,7 @@ def _similar_distances(task: ConversionTask, fits: Array) -> Array:
 
 def _follow(task: ConversionTask, steps: Sequence[Metric], start: Array) -> Attempt:
     """Descend under one metric after the other; the last step is settled if it is a short one."""
-    if task.metric.root > 1 and task.target.edge(np.ones(1)) is not None:
+    if task.metric.root > 1 and task.target_has_edge:
         # A root of a lobe has a slope at its edge whose square has no integral: as the edge moves
         # with the parameter, Gauss-Newton steps tend to 0 anywhere.
         return Attempt.nothing(start.size)
